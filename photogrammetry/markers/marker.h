@@ -1,0 +1,61 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace hexcal {
+
+/// The printed pattern of one square marker as a grid of cells, row by row from the top left of the upright
+/// marker. The marker's size is the edge of its square, which is centred on the grid and spans `square_cells`
+/// cells; with AprilTag's 36h11 the square is black and 8 cells wide. Beyond the grid the paper is white.
+struct MarkerPattern {
+  int cells = 0;                    ///< cells per side of the grid
+  double square_cells = 0;          ///< cells per side of the square whose corners are measured
+  std::vector<std::uint8_t> white;  ///< cells x cells, 1 white, 0 black
+};
+
+/// A family of markers: AprilTag's names (`tag36h11`, ...) and OpenCV's ArUco dictionaries (`DICT_4X4_50`,
+/// ...).
+struct MarkerFamily {
+  std::string name;
+  std::vector<MarkerPattern> patterns;  ///< by id
+};
+
+/// All patterns of a family. Throws InputError naming the known families if the name is none of them.
+[[nodiscard]] const MarkerFamily& marker_family(const std::string& name);
+[[nodiscard]] const std::vector<std::string>& marker_family_names();
+
+enum class MarkerStatus {
+  ok,
+  cut_by_frame,  ///< the frame's edge cuts the marker: its corners cannot be trusted
+  mirrored,      ///< read only when mirrored: photographed through a mirror
+  saturated,     ///< white or black clips
+  too_small,     ///< fewer pixels per side than can be measured
+  too_steep,     ///< seen at too flat an angle
+  low_contrast,
+  occluded,     ///< too little of the pattern is visible
+  misfit,       ///< the photometric model does not explain the pixels (chi^2)
+  not_refined,  ///< the refinement did not converge
+};
+
+/// A marker seen in a photograph. Corners 0 top-left, 1 top-right, 2 bottom-right, 3 bottom-left of the
+/// square as the marker is drawn upright, in sensor pixels (pixel (0, 0) is the centre of the top-left
+/// pixel).
+struct MarkerObservation {
+  int id = -1;
+  MarkerStatus status = MarkerStatus::not_refined;
+  std::array<Eigen::Vector2d, 4> corners_px;
+  /// Covariance in px^2 of (x0, y0, x1, y1, ..., y3), already scaled by the misfit if chi^2 says so.
+  Eigen::Matrix<double, 8, 8> covariance_px2 = Eigen::Matrix<double, 8, 8>::Identity();
+  double chi2_per_dof = 0;  ///< of the photometric fit
+  double blur_px = 0;       ///< standard deviation of the fitted point spread
+  double contrast = 0;      ///< white minus black over full scale, linear light
+  double side_px = 0;       ///< mean length of the four sides
+};
+
+[[nodiscard]] const char* marker_status_name(MarkerStatus status);
+
+}  // namespace hexcal

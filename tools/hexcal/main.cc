@@ -1,0 +1,34 @@
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <exception>
+
+#include "kinematics/geometry/input_error.h"
+#include "tools/hexcal/command.h"
+#include "tools/hexcal/version.h"
+
+int main(int argc, char** argv) {
+  CLI::App app{"hexcal: calibration of a Stewart platform by photographs", "hexcal"};
+  app.set_version_flag("--version", fmt::format("hexcal {}", hexcal::kVersion));
+  app.require_subcommand(1);
+  hexcal::Action action;
+  // In the order of a day's work.
+  for (const auto add : {hexcal::add_evaluate_command}) add(app, action);
+  try {
+    app.parse(argc, argv);
+    return action();
+  } catch (const CLI::Success& done) {  // --help, --version
+    return app.exit(done);
+  } catch (const CLI::ParseError& error) {
+    fmt::print(stderr, "hexcal: {} (see hexcal --help)\n", error.what());
+    return hexcal::kInputError;
+  } catch (const hexcal::InputError& error) {
+    fmt::print(stderr, "hexcal: {}\n", error.what());
+    return hexcal::kInputError;
+  } catch (const std::exception& error) {
+    fmt::print(stderr,
+               "hexcal: internal error: {}\nThis is a bug in hexcal; please report it with the command.\n",
+               error.what());
+    return hexcal::kBug;
+  }
+}

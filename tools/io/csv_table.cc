@@ -1,0 +1,177 @@
+#include "tools/io/csv_table.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "kinematics/geometry/input_error.h"
+#include "tools/io/atomic_file.h"
+
+namespace hexcal {
+namespace {
+
+std::string trimmed(std::string_view text) {
+  const auto first = text.find_first_not_of(" \t");
+  if (first == std::string_view::npos) return {};
+  const auto last = text.find_last_not_of(" \t");
+  return std::string(text.substr(first, last - first + 1));
+}
+
+// Takes one record off `text`, which may span lines inside quotes; counts the lines it took.
+std::vector<std::string> take_record(std::string_view& text, int& lines) {
+  std::vector<std::string> fields;
+  std::string field;
+  bool quoted = false;
+  bool was_quoted = false;
+  std::size_t i = 0;
+  lines = 1;
+  const auto finish_field = [&] {
+    fields.push_back(was_quoted ? field : trimmed(field));
+    field.clear();
+    was_quoted = false;
+  };
+  for (; i < text.size(); ++i) {
+    const char c = text[i];
+    if (quoted) {
+      if (c == '"' && i + 1 < text.size() && text[i + 1] == '"') {
+        field += '"';
+        ++i;
+      } else if (c == '"') {
+        quoted = false;
+      } else {
+        if (c == '\n') ++lines;
+        field += c;
+      }
+    } else if (c == '"' && trimmed(field).empty()) {
+      field.clear();
+      quoted = was_quoted = true;
+    } else if (c == ',') {
+      finish_field();
+    } else if (c == '\n') {
+      break;
+    } else if (c != '\r') {
+      field += c;
+    }
+  }
+  finish_field();
+  text.remove_prefix(std::min(i + 1, text.size()));
+  return fields;
+}
+
+std::optional<double> parse_number(const std::string& text) {
+  double value = 0;
+  const char* begin = text.data();
+  const char* end = begin + text.size();
+  if (begin != end && *begin == '+') ++begin;
+  const auto [rest, error] = std::from_chars(begin, end, value);
+  if (error != std::errc() || rest != end || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+CsvTable CsvTable::parse(std::string_view text, const std::filesystem::path& path) {
+  CsvTable table;
+  table.path_ = path;
+  if (text.substr(0, 3) == "\xEF\xBB\xBF") text.remove_prefix(3);
+  int line = 1;
+  while (!text.empty()) {
+    const std::size_t end = text.find('\n');
+    const std::string_view first_line = text.substr(0, end);
+    const std::string head = trimmed(first_line);
+    if (head.empty() || head == "\r" || head[0] == '#') {
+      if (!head.empty() && head[0] == '#') {
+        table.comments_.push_back(head.back() == '\r' ? head.substr(0, head.size() - 1) : head);
+      }
+      text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+      ++line;
+      continue;
+    }
+    int lines = 1;
+    Row row{line, take_record(text, lines)};
+    line += lines;
+    if (table.columns_.empty()) {
+      table.columns_ = std::move(row.fields);
+      for (std::size_t i = 0; i < table.columns_.size(); ++i) {
+        if (std::count(table.columns_.begin(), table.columns_.end(), table.columns_[i]) > 1) {
+          throw InputError(
+              fmt::format("{}:{}: column '{}' stands twice", path.string(), row.line, table.columns_[i]));
+        }
+      }
+    } else if (row.fields.size() != table.columns_.size()) {
+      throw InputError(fmt::format("{}:{}: found {} fields, wanted {} as in the header", path.string(),
+                                   row.line, row.fields.size(), table.columns_.size()));
+    } else {
+      table.rows_.push_back(std::move(row));
+    }
+  }
+  if (table.columns_.empty()) throw InputError(fmt::format("{}: no header line", path.string()));
+  return table;
+}
+
+CsvTable CsvTable::read(const std::filesystem::path& path) { return parse(read_file(path), path); }
+
+bool CsvTable::has_column(std::string_view name) const {
+  return std::find(columns_.begin(), columns_.end(), name) != columns_.end();
+}
+
+void CsvTable::require_columns(const std::vector<std::string>& names) const {
+  for (const auto& name : names) {
+    if (!has_column(name)) {
+      throw InputError(fmt::format("{}: column '{}' is missing; found {}", path_.string(), name,
+                                   fmt::join(columns_, ", ")));
+    }
+  }
+}
+
+std::size_t CsvTable::column_index(std::string_view name) const {
+  const auto found = std::find(columns_.begin(), columns_.end(), name);
+  if (found == columns_.end()) require_columns({std::string(name)});
+  return static_cast<std::size_t>(found - columns_.begin());
+}
+
+const std::string& CsvTable::text(std::size_t row, std::string_view column) const {
+  return rows_[row].fields[column_index(column)];
+}
+
+void CsvTable::fail(std::size_t row, std::string_view column, const std::string& message) const {
+  throw InputError(fmt::format("{}:{}: column '{}': {}", path_.string(), rows_[row].line, column, message));
+}
+
+double CsvTable::number(std::size_t row, std::string_view column) const {
+  const std::string& field = text(row, column);
+  const auto value = parse_number(field);
+  if (!value) fail(row, column, fmt::format("'{}' is not a number", field));
+  return *value;
+}
+
+std::optional<double> CsvTable::optional_number(std::size_t row, std::string_view column) const {
+  const std::string& field = text(row, column);
+  if (field.empty() || field == "nan" || field == "NaN") return std::nullopt;
+  return number(row, column);
+}
+
+int CsvTable::integer(std::size_t row, std::string_view column) const {
+  const double value = number(row, column);
+  if (value != std::floor(value) || std::abs(value) > 2e9) {
+    fail(row, column, fmt::format("'{}' is not a whole number", text(row, column)));
+  }
+  return static_cast<int>(value);
+}
+
+std::string csv_field(std::string_view text) {
+  if (text.find_first_of(",\"\r\n") == std::string_view::npos && (text.empty() || text[0] != '#')) {
+    return std::string(text);
+  }
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"') quoted += '"';
+    quoted += c;
+  }
+  return quoted + '"';
+}
+
+}  // namespace hexcal

@@ -1,0 +1,142 @@
+#include "tools/io/pose_table.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <set>
+
+#include "kinematics/geometry/input_error.h"
+#include "tools/io/csv_table.h"
+
+namespace hexcal {
+namespace {
+
+constexpr std::array kPoseNames{"x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg"};
+constexpr std::array kLegNames{"q1", "q2", "q3", "q4", "q5", "q6"};
+
+double unit(std::size_t i) { return i < 3 ? 1.0 : kRadPerDeg; }
+
+std::string read_id(const CsvTable& table, std::size_t row, std::set<std::string>& seen) {
+  const std::string& id = table.text(row, "pose");
+  if (id.empty()) table.fail(row, "pose", "is empty, wanted a pose id");
+  if (!seen.insert(id).second) table.fail(row, "pose", fmt::format("pose '{}' stands twice", id));
+  return id;
+}
+
+// Six numbers, or none at all where the row's status allows it.
+std::optional<Vector6d> read_six(const CsvTable& table, std::size_t row,
+                                 const std::array<const char*, 6>& names, bool may_be_empty) {
+  Vector6d v;
+  for (std::size_t i = 0; i < 6; ++i) {
+    if (may_be_empty && table.text(row, names[i]).empty()) return std::nullopt;
+    v[static_cast<Eigen::Index>(i)] = table.number(row, names[i]);
+  }
+  return v;
+}
+
+}  // namespace
+
+std::vector<PoseRecord> read_pose_table(const std::filesystem::path& path) {
+  const CsvTable table = CsvTable::read(path);
+  std::vector<std::string> required{"pose"};
+  required.insert(required.end(), kPoseNames.begin(), kPoseNames.end());
+  table.require_columns(required);
+  const bool has_sigma = table.has_column("sigma_x_mm");
+  std::set<std::string> seen;
+  std::vector<PoseRecord> records;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    PoseRecord record;
+    record.id = read_id(table, row, seen);
+    if (table.has_column("status")) record.status = table.text(row, "status");
+    if (auto v = read_six(table, row, kPoseNames, record.status != "ok")) {
+      v->tail<3>() *= kRadPerDeg;
+      record.pose = Pose::from_vector(*v);
+    }
+    if (has_sigma && record.pose) {
+      Vector6d sigma;
+      bool complete = true;
+      for (std::size_t i = 0; i < 6; ++i) {
+        const auto value = table.optional_number(row, fmt::format("sigma_{}", kPoseNames[i]));
+        complete = complete && value.has_value();
+        sigma[static_cast<Eigen::Index>(i)] = value.value_or(0.0) * unit(i);
+      }
+      if (complete) record.sigma = sigma;
+    }
+    if (table.has_column("images")) record.images = table.integer(row, "images");
+    if (table.has_column("markers")) record.markers = table.integer(row, "markers");
+    if (table.has_column("rms_px")) record.rms_px = table.optional_number(row, "rms_px");
+    records.push_back(std::move(record));
+  }
+  return records;
+}
+
+std::string format_pose_table(const std::string& head, const std::vector<PoseRecord>& records,
+                              PoseColumns columns) {
+  const bool with_status = columns != PoseColumns::target;
+  const bool measured = columns == PoseColumns::measured;
+  std::string out = head + "pose";
+  if (with_status) out += ",status";
+  for (const char* name : kPoseNames) out += fmt::format(",{}", name);
+  if (measured) {
+    for (const char* name : kPoseNames) out += fmt::format(",sigma_{}", name);
+    out += ",images,markers,rms_px";
+  }
+  out += '\n';
+  for (const PoseRecord& record : records) {
+    out += csv_field(record.id);
+    if (with_status) out += ',' + csv_field(record.status);
+    for (std::size_t i = 0; i < 6; ++i) {
+      out += ',';
+      if (record.pose) {
+        out += fmt::format("{:.{}f}", record.pose->vector()[static_cast<Eigen::Index>(i)] / unit(i),
+                           i < 3 ? 6 : 7);
+      }
+    }
+    if (measured) {
+      for (std::size_t i = 0; i < 6; ++i) {
+        out += ',';
+        if (record.sigma)
+          out += fmt::format("{:.4g}", (*record.sigma)[static_cast<Eigen::Index>(i)] / unit(i));
+      }
+      out += fmt::format(",{},{},", record.images.value_or(0), record.markers.value_or(0));
+      if (record.rms_px) out += fmt::format("{:.4f}", *record.rms_px);
+    }
+    out += '\n';
+  }
+  return out;
+}
+
+std::vector<LegRecord> read_leg_table(const std::filesystem::path& path) {
+  const CsvTable table = CsvTable::read(path);
+  std::vector<std::string> required{"pose"};
+  required.insert(required.end(), kLegNames.begin(), kLegNames.end());
+  table.require_columns(required);
+  std::set<std::string> seen;
+  std::vector<LegRecord> records;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    LegRecord record;
+    record.id = read_id(table, row, seen);
+    if (table.has_column("status")) record.status = table.text(row, "status");
+    record.readings = read_six(table, row, kLegNames, record.status != "ok");
+    records.push_back(std::move(record));
+  }
+  return records;
+}
+
+std::string format_leg_table(const std::string& head, const std::vector<LegRecord>& records,
+                             bool with_status) {
+  std::string out = head + (with_status ? "pose,status" : "pose");
+  for (const char* name : kLegNames) out += fmt::format(",{}", name);
+  out += '\n';
+  for (const LegRecord& record : records) {
+    out += csv_field(record.id);
+    if (with_status) out += ',' + csv_field(record.status);
+    for (Eigen::Index i = 0; i < 6; ++i) {
+      out += record.readings ? fmt::format(",{:.9g}", (*record.readings)[i]) : std::string(",");
+    }
+    out += '\n';
+  }
+  return out;
+}
+
+}  // namespace hexcal

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "kinematics/geometry/pose.h"
+
+namespace hexcal {
+
+/// One row of targets.csv, poses.csv or predicted_poses.csv. Absent columns are absent here.
+struct PoseRecord {
+  std::string id;
+  std::string status = "ok";      ///< "ok", or why there is no pose
+  std::optional<Pose> pose;       ///< absent when the row has no numbers (a failed pose)
+  std::optional<Vector6d> sigma;  ///< mm and rad
+  std::optional<int> images;
+  std::optional<int> markers;
+  std::optional<double> rms_px;
+};
+
+/// Reads a pose table (columns pose,x_mm,...,yaw_deg and optional others). Duplicate ids are an error. A row
+/// whose status is not "ok" may leave its numbers empty; any other row must have all six.
+[[nodiscard]] std::vector<PoseRecord> read_pose_table(const std::filesystem::path& path);
+
+enum class PoseColumns {
+  target,     ///< pose,x_mm,...,yaw_deg
+  predicted,  ///< pose,status,x_mm,...,yaw_deg
+  measured,   ///< pose,status,x_mm,...,yaw_deg,sigma_x_mm,...,sigma_yaw_deg,images,markers,rms_px
+};
+
+/// Text of a pose table; `head` is its comment lines. Numbers carry 1e-6 mm and 1e-7 deg.
+[[nodiscard]] std::string format_pose_table(const std::string& head, const std::vector<PoseRecord>& records,
+                                            PoseColumns columns);
+
+/// One row of legs.csv or actuators.csv: actuator readings q1..q6 in actuator units.
+struct LegRecord {
+  std::string id;
+  std::string status = "ok";
+  std::optional<Vector6d> readings;
+};
+
+[[nodiscard]] std::vector<LegRecord> read_leg_table(const std::filesystem::path& path);
+[[nodiscard]] std::string format_leg_table(const std::string& head, const std::vector<LegRecord>& records,
+                                           bool with_status);
+
+}  // namespace hexcal

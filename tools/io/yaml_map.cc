@@ -1,0 +1,292 @@
+#include "tools/io/yaml_map.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "kinematics/geometry/input_error.h"
+#include "kinematics/geometry/pose.h"
+#include "tools/io/atomic_file.h"
+
+namespace hexcal {
+
+struct YamlMap::State {
+  std::filesystem::path path;
+  std::string prefix;  // dotted name of this mapping, with a trailing dot
+  YAML::Node node;
+  std::set<std::string> asked;
+};
+
+namespace {
+
+constexpr std::size_t kMaxYamlBytes = 16 << 20;
+
+std::string place(const std::filesystem::path& path, const YAML::Node& node) {
+  return fmt::format("{}:{}", path.string(), node.Mark().line + 1);
+}
+
+std::string shown(const YAML::Node& node) {
+  if (node.IsScalar()) return fmt::format("'{}'", node.Scalar());
+  if (node.IsSequence()) return fmt::format("a list of {}", node.size());
+  if (node.IsMap()) return "a mapping";
+  return "nothing";
+}
+
+std::optional<double> parse_number(const std::string& text) {
+  double value = 0;
+  const char* begin = text.data();
+  const char* end = begin + text.size();
+  if (begin != end && *begin == '+') ++begin;
+  const auto [rest, error] = std::from_chars(begin, end, value);
+  if (error != std::errc() || rest != end || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+std::size_t edit_distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t up = row[j];
+      row[j] = std::min({up + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0 : 1)});
+      diagonal = up;
+    }
+  }
+  return row[b.size()];
+}
+
+}  // namespace
+
+YamlMap YamlMap::parse(const std::string& text, const std::filesystem::path& path) {
+  if (text.size() > kMaxYamlBytes) {
+    throw InputError(
+        fmt::format("{}: {} bytes, wanted at most {}", path.string(), text.size(), kMaxYamlBytes));
+  }
+  auto state = std::make_shared<State>();
+  state->path = path;
+  try {
+    state->node = YAML::Load(text);
+  } catch (const YAML::Exception& error) {
+    throw InputError(fmt::format("{}:{}: not valid YAML: {}", path.string(), error.mark.line + 1, error.msg));
+  }
+  if (!state->node.IsMap()) {
+    throw InputError(fmt::format("{}: found {}, wanted keys and values", path.string(), shown(state->node)));
+  }
+  return YamlMap(state);
+}
+
+YamlMap YamlMap::read(const std::filesystem::path& path) { return parse(read_file(path), path); }
+
+const std::filesystem::path& YamlMap::path() const { return state_->path; }
+
+namespace {
+YAML::Node find(const YAML::Node& node, const std::string& key) {
+  for (const auto& entry : node) {
+    if (entry.first.IsScalar() && entry.first.Scalar() == key) return entry.second;
+  }
+  return YAML::Node(YAML::NodeType::Undefined);
+}
+}  // namespace
+
+bool YamlMap::has(const std::string& key) const {
+  state_->asked.insert(key);
+  const YAML::Node node = find(state_->node, key);
+  return node.IsDefined() && !node.IsNull();
+}
+
+void YamlMap::fail(const std::string& key, const std::string& message) const {
+  const YAML::Node node = find(state_->node, key);
+  const std::string where = place(state_->path, node.IsDefined() ? node : state_->node);
+  throw InputError(fmt::format("{}: {}{}: {}", where, state_->prefix, key, message));
+}
+
+namespace {
+YAML::Node require(const YamlMap& map, const YAML::Node& node, const std::string& key, const char* wanted) {
+  if (!map.has(key)) map.fail(key, fmt::format("missing, wanted {}", wanted));
+  return find(node, key);
+}
+}  // namespace
+
+double YamlMap::number(const std::string& key) const {
+  const YAML::Node node = require(*this, state_->node, key, "a number");
+  const auto value = node.IsScalar() ? parse_number(node.Scalar()) : std::nullopt;
+  if (!value) fail(key, fmt::format("found {}, wanted a number", shown(node)));
+  return *value;
+}
+
+double YamlMap::number_or(const std::string& key, double fallback) const {
+  return has(key) ? number(key) : fallback;
+}
+
+int YamlMap::integer(const std::string& key) const {
+  const double value = number(key);
+  if (value != std::floor(value) || std::abs(value) > 2e9) {
+    fail(key, fmt::format("found {}, wanted a whole number", shown(find(state_->node, key))));
+  }
+  return static_cast<int>(value);
+}
+
+bool YamlMap::boolean_or(const std::string& key, bool fallback) const {
+  if (!has(key)) return fallback;
+  const YAML::Node node = find(state_->node, key);
+  bool value = false;
+  if (!node.IsScalar() || !YAML::convert<bool>::decode(node, value)) {
+    fail(key, fmt::format("found {}, wanted true or false", shown(node)));
+  }
+  return value;
+}
+
+std::string YamlMap::text(const std::string& key) const {
+  const YAML::Node node = require(*this, state_->node, key, "a text");
+  if (!node.IsScalar()) fail(key, fmt::format("found {}, wanted a text", shown(node)));
+  return node.Scalar();
+}
+
+std::optional<std::string> YamlMap::optional_text(const std::string& key) const {
+  if (!has(key)) return std::nullopt;
+  return text(key);
+}
+
+std::string YamlMap::choice(const std::string& key, const std::vector<std::string>& allowed) const {
+  const std::string value = text(key);
+  if (std::find(allowed.begin(), allowed.end(), value) == allowed.end()) {
+    fail(key, fmt::format("found '{}', wanted one of {}", value, fmt::join(allowed, ", ")));
+  }
+  return value;
+}
+
+std::vector<double> YamlMap::numbers(const std::string& key, std::size_t size) const {
+  const YAML::Node node = require(*this, state_->node, key, "a list of numbers");
+  if (!node.IsSequence() || (size != 0 && node.size() != size)) {
+    fail(key, fmt::format("found {}, wanted a list of {}numbers", shown(node),
+                          size != 0 ? fmt::format("{} ", size) : std::string()));
+  }
+  std::vector<double> values;
+  for (const auto& entry : node) {
+    const auto value = entry.IsScalar() ? parse_number(entry.Scalar()) : std::nullopt;
+    if (!value) fail(key, fmt::format("found {}, wanted a number", shown(entry)));
+    values.push_back(*value);
+  }
+  return values;
+}
+
+std::vector<double> YamlMap::numbers_or_one(const std::string& key, std::size_t size) const {
+  if (has(key) && !is_sequence(key)) return std::vector<double>(size, number(key));
+  return numbers(key, size);
+}
+
+Eigen::Vector3d YamlMap::vector3(const std::string& key) const {
+  const std::vector<double> v = numbers(key, 3);
+  return {v[0], v[1], v[2]};
+}
+
+std::vector<Eigen::Vector3d> YamlMap::vectors3(const std::string& key, std::size_t size) const {
+  const YAML::Node node = require(*this, state_->node, key, "a list of [x, y, z]");
+  if (!node.IsSequence() || (size != 0 && node.size() != size)) {
+    fail(key, fmt::format("found {}, wanted a list of {}[x, y, z]", shown(node),
+                          size != 0 ? fmt::format("{} ", size) : std::string()));
+  }
+  std::vector<Eigen::Vector3d> values;
+  for (const auto& entry : node) {
+    Eigen::Vector3d v;
+    if (!entry.IsSequence() || entry.size() != 3)
+      fail(key, fmt::format("found {}, wanted [x, y, z]", shown(entry)));
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto value = entry[i].IsScalar() ? parse_number(entry[i].Scalar()) : std::nullopt;
+      if (!value) fail(key, fmt::format("found {}, wanted a number", shown(entry[i])));
+      v[static_cast<Eigen::Index>(i)] = *value;
+    }
+    values.push_back(v);
+  }
+  return values;
+}
+
+std::vector<std::string> YamlMap::texts(const std::string& key) const {
+  const YAML::Node node = require(*this, state_->node, key, "a list");
+  if (!node.IsSequence()) fail(key, fmt::format("found {}, wanted a list", shown(node)));
+  std::vector<std::string> values;
+  for (const auto& entry : node) {
+    if (!entry.IsScalar()) fail(key, fmt::format("found {}, wanted a single value", shown(entry)));
+    values.push_back(entry.Scalar());
+  }
+  return values;
+}
+
+Rigid3 YamlMap::rigid3(const std::string& key) const {
+  const YamlMap motion = map(key);
+  const Eigen::Vector3d xyz_mm = motion.vector3("xyz_mm");
+  const Eigen::Vector3d rpy_deg = motion.vector3("rpy_deg");
+  motion.finish();
+  return {quaternion_from_rpy(rpy_deg * kRadPerDeg), xyz_mm};
+}
+
+YamlMap YamlMap::map(const std::string& key) const {
+  const YAML::Node node = require(*this, state_->node, key, "keys and values");
+  if (!node.IsMap()) fail(key, fmt::format("found {}, wanted keys and values", shown(node)));
+  auto state = std::make_shared<State>();
+  state->path = state_->path;
+  state->prefix = state_->prefix + key + ".";
+  state->node = node;
+  return YamlMap(state);
+}
+
+std::vector<YamlMap> YamlMap::maps(const std::string& key) const {
+  const YAML::Node node = require(*this, state_->node, key, "a list");
+  if (!node.IsSequence()) fail(key, fmt::format("found {}, wanted a list", shown(node)));
+  std::vector<YamlMap> all;
+  for (std::size_t i = 0; i < node.size(); ++i) {
+    if (!node[i].IsMap()) fail(key, fmt::format("found {}, wanted keys and values", shown(node[i])));
+    auto state = std::make_shared<State>();
+    state->path = state_->path;
+    state->prefix = fmt::format("{}{}[{}].", state_->prefix, key, i);
+    state->node = node[i];
+    all.push_back(YamlMap(state));
+  }
+  return all;
+}
+
+std::vector<std::string> YamlMap::keys() const {
+  std::vector<std::string> all;
+  for (const auto& entry : state_->node) {
+    if (!entry.first.IsScalar()) {
+      throw InputError(fmt::format("{}: a key is not a single value", place(state_->path, entry.first)));
+    }
+    all.push_back(entry.first.Scalar());
+    state_->asked.insert(all.back());
+  }
+  return all;
+}
+
+bool YamlMap::is_map(const std::string& key) const { return has(key) && find(state_->node, key).IsMap(); }
+bool YamlMap::is_sequence(const std::string& key) const {
+  return has(key) && find(state_->node, key).IsSequence();
+}
+
+void YamlMap::finish() const {
+  std::set<std::string> seen;
+  for (const auto& entry : state_->node) {
+    const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : shown(entry.first);
+    const std::string where = place(state_->path, entry.first);
+    if (!seen.insert(key).second) {
+      throw InputError(fmt::format("{}: key '{}{}' stands twice", where, state_->prefix, key));
+    }
+    if (state_->asked.count(key) != 0) continue;
+    const auto nearest = std::min_element(state_->asked.begin(), state_->asked.end(),
+                                          [&](const std::string& a, const std::string& b) {
+                                            return edit_distance(a, key) < edit_distance(b, key);
+                                          });
+    std::string hint = fmt::format("; known here: {}", fmt::join(state_->asked, ", "));
+    if (nearest != state_->asked.end() && edit_distance(*nearest, key) <= 3) {
+      hint = fmt::format("; did you mean '{}'?", *nearest);
+    }
+    throw InputError(fmt::format("{}: unknown key '{}{}'{}", where, state_->prefix, key, hint));
+  }
+}
+
+}  // namespace hexcal
