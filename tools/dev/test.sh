@@ -3,7 +3,6 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 tools/dev/setup.sh
-cmake --preset release >build-configure.log 2>&1 || { cat build-configure.log; exit 1; }
-rm -f build-configure.log
+cmake --preset release --log-level=WARNING
 cmake --build --preset release
 ctest --preset release -j "$(nproc)" "$@"
