@@ -1,0 +1,47 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "tests/support/run_hexcal.h"
+
+namespace hexcal {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class Evaluate : public ::testing::Test {
+ protected:
+  std::string write(const std::string& name, const std::string& rows) {
+    const std::filesystem::path path = folder_.path() / name;
+    std::ofstream(path) << "pose,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\n" << rows;
+    return path.string();
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(Evaluate, PrintsThePapersTableAndTheFairOne) {
+  const std::string targets = write("t.csv", "a,0,0,0,0,0,0\nb,10,0,0,5,0,0\nc,0,5,0,0,1,0\n");
+  // Ranges of the paper's table 2, a missing row after compensation.
+  const std::string before =
+      write("b.csv", "a,26.54,16.67,13.49,8.27,11.99,12.59\nb,10,0,0,5,0,0\nc,1,6,1,1,2,1\n");
+  const std::string after = write("a.csv", "a,20.25,18.44,14.01,6.86,10.29,9.2\nb,10,0,0,5,0,0\n");
+  const CommandResult r =
+      run_hexcal({"evaluate", "--targets", targets, "--before", before, "--after", after});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.out,
+              AllOf(HasSubstr("19.70"), HasSubstr("11.1155"), HasSubstr("17.761"), HasSubstr("8.8991")));
+  EXPECT_THAT(r.out, AllOf(HasSubstr("9.8 %"), HasSubstr("19.9 %"), HasSubstr("same 2 poses")));
+}
+
+TEST_F(Evaluate, RefusesTablesThatShareNoPose) {
+  const std::string targets = write("t.csv", "a,0,0,0,0,0,0\n");
+  const std::string before = write("b.csv", "z,1,0,0,0,0,0\n");
+  const CommandResult r = run_hexcal({"evaluate", "--targets", targets, "--before", before});
+  EXPECT_EQ(r.exit_code, 2);
+  EXPECT_THAT(r.err, HasSubstr("no pose has a target"));
+}
+
+}  // namespace
+}  // namespace hexcal
