@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <cstdlib>
 #include <functional>
 #include <map>
 #include <mutex>
@@ -71,7 +72,9 @@ MarkerPattern april_tag_pattern(apriltag_family_t* family, std::uint32_t id) {
       pattern.white.push_back(image->buf[y * image->stride + x] > 127 ? 1 : 0);
     }
   }
-  image_u8_destroy(image);
+  // The library's own image_u8_destroy is not among the symbols it exports; this is what it does.
+  std::free(image->buf);
+  std::free(image);
   return pattern;
 }
 
@@ -147,6 +150,8 @@ const char* marker_status_name(MarkerStatus status) {
       return "occluded";
     case MarkerStatus::misfit:
       return "misfit";
+    case MarkerStatus::inverted:
+      return "inverted";
     case MarkerStatus::not_refined:
       return "not_refined";
   }

@@ -38,6 +38,7 @@ enum class MarkerStatus {
   low_contrast,
   occluded,     ///< too little of the pattern is visible
   misfit,       ///< the photometric model does not explain the pixels (chi^2)
+  inverted,     ///< read only as a negative: black and white are swapped
   not_refined,  ///< the refinement did not converge
 };
 

@@ -23,6 +23,8 @@ struct PhotographInfo {
 
 enum class PhotographStatus { ok, missing, empty, unreadable, truncated, too_large };
 
+[[nodiscard]] const char* photograph_status_name(PhotographStatus status);
+
 /// How pixel values came from light: gamma-encoded as in a camera's JPEG (sRGB to start with) or linear as in
 /// RAW.
 enum class ToneCurve { srgb, linear };

@@ -2,17 +2,16 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <openssl/evp.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <memory>
 
 #include "kinematics/geometry/input_error.h"
+#include "photogrammetry/photograph/sha256.h"
 
 namespace hexcal {
 namespace {
@@ -87,17 +86,6 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view c
   TemporaryFile temporary(target);
   temporary.write(contents, target);
   temporary.rename_to(target);
-}
-
-std::string sha256_hex(std::string_view bytes) {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-  unsigned int length = 0;
-  if (EVP_Digest(bytes.data(), bytes.size(), digest.data(), &length, EVP_sha256(), nullptr) != 1) {
-    throw std::runtime_error("SHA-256 is not available");
-  }
-  std::string hex;
-  for (unsigned int i = 0; i < length; ++i) hex += fmt::format("{:02x}", digest[i]);
-  return hex;
 }
 
 std::string provenance_line(std::string_view version, std::string_view command,

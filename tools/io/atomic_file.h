@@ -5,6 +5,8 @@
 #include <string_view>
 #include <vector>
 
+#include "photogrammetry/photograph/sha256.h"
+
 namespace hexcal {
 
 /// Whole file as bytes. Throws InputError naming the file if it cannot be read.
@@ -15,9 +17,6 @@ namespace hexcal {
 /// InputError with the system's reason (permission, no space left, ...) and then leaves the old file
 /// untouched.
 void write_file_atomically(const std::filesystem::path& path, std::string_view contents);
-
-/// SHA-256 in hexadecimal.
-[[nodiscard]] std::string sha256_hex(std::string_view bytes);
 
 /// First comment line of every output: "# hexcal VERSION  COMMAND  NAME sha256:HASH ...". Inputs that do not
 /// exist are left out; names are printed without their folders so that the line does not depend on where the

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <array>
+#include <opencv2/core/mat.hpp>
+
+#include "photogrammetry/camera/camera_model.h"
+#include "photogrammetry/markers/marker.h"
+#include "photogrammetry/photograph/photograph.h"
+
+namespace hexcal {
+
+/// When a marker is measured but not trusted.
+struct RefineOptions {
+  double min_side_px = 12;      ///< shortest side that is measured
+  double max_tilt_deg = 75;     ///< angle between the marker's normal and the line of sight
+  double min_contrast = 0.03;   ///< white minus black over full scale, linear light
+  double max_saturated = 0.02;  ///< share of the marker's pixels that clip
+  double min_visible = 0.6;     ///< share of the pattern's transitions that the fit used
+  double max_chi2_per_dof = 5;  ///< of the photometric fit
+
+  /// Throws InputError naming field and value.
+  void validate() const;
+};
+
+/// Maximum-likelihood photometric fit of one marker: its pattern, mapped by a homography and the lens (if a
+/// camera is given), blurred, shaded by a linear illumination gradient between free black and white levels
+/// and passed through the tone curve, is fitted to the pixels around the pattern's transitions. `corners_px`
+/// in the order of MarkerObservation, within about 3 px. The result's id is -1; its status says whether it
+/// can be trusted.
+[[nodiscard]] MarkerObservation refine_marker(const cv::Mat& grey, ToneCurve tone,
+                                              const MarkerPattern& pattern,
+                                              const std::array<Eigen::Vector2d, 4>& corners_px,
+                                              const RefineOptions& options = {},
+                                              const CameraModel* camera = nullptr);
+
+/// A point measured in a photograph.
+struct PointObservation {
+  MarkerStatus status = MarkerStatus::not_refined;
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Identity();
+  double chi2_per_dof = 0;
+  double blur_px = 0;
+  double contrast = 0;  ///< white minus black over full scale, linear light
+};
+
+/// Where four squares of a chessboard meet. `approximate_px` within about 2 px; `to_x_px` and `to_y_px` lead
+/// from it to the neighbouring corners of the board (px), or half a marker's gap where less of the board's
+/// edges is free. The window reaches 45 % of the way to them, at most 12 px.
+[[nodiscard]] PointObservation refine_saddle(const cv::Mat& grey, ToneCurve tone,
+                                             const Eigen::Vector2d& approximate_px,
+                                             const Eigen::Vector2d& to_x_px, const Eigen::Vector2d& to_y_px,
+                                             const RefineOptions& options = {});
+
+/// The image of a printed dot's true centre. `image_from_plane` maps the board's plane to pixels near the dot
+/// (a homography good to a few px; the lens may be linearised into it); centre and radius in the plane's
+/// unit. The circle is projected as a conic, so that the eccentricity of its image (Luhmann 2014) is part of
+/// the model; position and radius are free.
+[[nodiscard]] PointObservation refine_dot(const cv::Mat& grey, ToneCurve tone,
+                                          const Eigen::Matrix3d& image_from_plane,
+                                          const Eigen::Vector2d& centre_in_plane, double radius,
+                                          const RefineOptions& options = {});
+
+}  // namespace hexcal

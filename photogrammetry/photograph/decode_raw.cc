@@ -1,0 +1,49 @@
+#include <libraw/libraw.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "photogrammetry/photograph/decoders.h"
+
+namespace hexcal {
+
+DecodedImage decode_raw_green(std::string_view bytes) {
+  DecodedImage image;
+  image.tone = ToneCurve::linear;
+  // LibRaw's object is too large for the stack of a worker thread.
+  const auto raw = std::make_unique<LibRaw>();
+  auto& params = raw->imgdata.params;
+  params.output_bps = 16;
+  params.gamm[0] = params.gamm[1] = 1;
+  params.no_auto_bright = 1;
+  params.output_color = 0;
+  params.user_flip = 0;
+  params.user_qual = 0;  // bilinear: linear in the samples, so edges keep their place
+  std::fill(std::begin(params.user_mul), std::end(params.user_mul), 1.0F);
+  const auto failed = [&image](int code) {
+    if (code == LIBRAW_SUCCESS) return false;
+    image.reason = LibRaw::strerror(code);
+    if (code == LIBRAW_IO_ERROR || code == LIBRAW_DATA_ERROR) image.status = PhotographStatus::truncated;
+    return true;
+  };
+  if (failed(raw->open_buffer(const_cast<char*>(bytes.data()), bytes.size()))) {
+    image.status = PhotographStatus::unreadable;
+    return image;
+  }
+  const auto& sizes = raw->imgdata.sizes;
+  if (static_cast<long long>(sizes.raw_width) * sizes.raw_height > kMaxPixels) {
+    image.status = PhotographStatus::too_large;
+    image.reason = std::to_string(sizes.raw_width) + " x " + std::to_string(sizes.raw_height) + " pixels";
+    return image;
+  }
+  if (failed(raw->unpack()) || failed(raw->dcraw_process())) return image;
+  image.grey.create(sizes.iheight, sizes.iwidth, CV_16UC1);
+  for (int y = 0; y < image.grey.rows; ++y) {
+    const ushort(*row)[4] = raw->imgdata.image + static_cast<std::ptrdiff_t>(y) * image.grey.cols;
+    for (int x = 0; x < image.grey.cols; ++x) image.grey.at<std::uint16_t>(y, x) = row[x][1];
+  }
+  image.status = PhotographStatus::ok;
+  return image;
+}
+
+}  // namespace hexcal

@@ -1,0 +1,97 @@
+#include "photogrammetry/photograph/photograph.h"
+
+#include <algorithm>
+#include <fstream>
+
+#include "photogrammetry/photograph/decoders.h"
+#include "photogrammetry/photograph/sha256.h"
+
+namespace hexcal {
+namespace {
+
+constexpr std::uintmax_t kMaxFileBytes = 1U << 30;
+
+struct FileBytes {
+  PhotographStatus status = PhotographStatus::unreadable;
+  std::string reason;
+  std::string bytes;
+};
+
+FileBytes read_bytes(const std::filesystem::path& path) {
+  FileBytes file;
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) return {PhotographStatus::missing, "no such file", {}};
+  if (!std::filesystem::is_regular_file(path, error)) return {PhotographStatus::unreadable, "not a file", {}};
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error) return {PhotographStatus::unreadable, error.message(), {}};
+  if (size == 0) return {PhotographStatus::empty, "the file has no content", {}};
+  if (size > kMaxFileBytes) return {PhotographStatus::too_large, std::to_string(size) + " bytes", {}};
+  std::ifstream in(path, std::ios::binary);
+  file.bytes.resize(size);
+  if (!in || !in.read(file.bytes.data(), static_cast<std::streamsize>(size))) {
+    return {PhotographStatus::unreadable, "cannot be read", {}};
+  }
+  file.status = PhotographStatus::ok;
+  return file;
+}
+
+bool has_raw_extension(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension == ".nef" || extension == ".dng";
+}
+
+DecodedImage decode(const std::filesystem::path& path, std::string_view bytes) {
+  if (bytes.substr(0, 2) == "\xFF\xD8") return decode_jpeg_luma(bytes);
+  if (has_raw_extension(path)) return decode_raw_green(bytes);
+  return decode_raster(bytes);
+}
+
+}  // namespace
+
+Photograph read_photograph(const std::filesystem::path& path) {
+  Photograph photograph;
+  photograph.path = path;
+  const FileBytes file = read_bytes(path);
+  photograph.status = file.status;
+  photograph.reason = file.reason;
+  if (file.status != PhotographStatus::ok) return photograph;
+  photograph.sha256 = sha256_hex(file.bytes);
+  photograph.info = read_exif(file.bytes);
+  DecodedImage image = decode(path, file.bytes);
+  photograph.status = image.status;
+  photograph.reason = image.reason;
+  photograph.tone = image.tone;
+  photograph.grey = image.grey;
+  if (image.status == PhotographStatus::ok) {
+    photograph.info.width_px = image.grey.cols;
+    photograph.info.height_px = image.grey.rows;
+  }
+  return photograph;
+}
+
+PhotographInfo read_photograph_info(const std::filesystem::path& path) {
+  const FileBytes file = read_bytes(path);
+  return file.status == PhotographStatus::ok ? read_exif(file.bytes) : PhotographInfo{};
+}
+
+const char* photograph_status_name(PhotographStatus status) {
+  switch (status) {
+    case PhotographStatus::ok:
+      return "ok";
+    case PhotographStatus::missing:
+      return "missing";
+    case PhotographStatus::empty:
+      return "empty";
+    case PhotographStatus::unreadable:
+      return "unreadable";
+    case PhotographStatus::truncated:
+      return "truncated";
+    case PhotographStatus::too_large:
+      return "too_large";
+  }
+  return "";
+}
+
+}  // namespace hexcal

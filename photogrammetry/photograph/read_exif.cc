@@ -1,0 +1,97 @@
+#include <exiv2/exiv2.hpp>
+#include <mutex>
+
+#include "photogrammetry/photograph/decoders.h"
+
+namespace hexcal {
+namespace {
+
+class ExifReader {
+ public:
+  explicit ExifReader(const Exiv2::ExifData& data) : data_(data) {}
+
+  [[nodiscard]] std::optional<std::string> text(const char* key, bool interpreted = false) const {
+    const auto entry = data_.findKey(Exiv2::ExifKey(key));
+    if (entry == data_.end() || entry->count() == 0) return std::nullopt;
+    std::string value = interpreted ? entry->print(&data_) : entry->toString();
+    const auto last = value.find_last_not_of(std::string(" \0", 2));
+    value.erase(last == std::string::npos ? 0 : last + 1);
+    value.erase(0, value.find_first_not_of(' '));
+    if (value.empty()) return std::nullopt;
+    return value;
+  }
+
+  [[nodiscard]] std::optional<double> number(const char* key) const {
+    const auto entry = data_.findKey(Exiv2::ExifKey(key));
+    if (entry == data_.end() || entry->count() == 0) return std::nullopt;
+    const auto [over, under] = entry->toRational();
+    if (under == 0 || !entry->value().ok()) return std::nullopt;
+    return static_cast<double>(over) / under;
+  }
+
+  [[nodiscard]] std::optional<int> integer(const char* key) const {
+    const auto entry = data_.findKey(Exiv2::ExifKey(key));
+    if (entry == data_.end() || entry->count() == 0) return std::nullopt;
+    const auto value = static_cast<int>(entry->toLong());
+    if (!entry->value().ok()) return std::nullopt;
+    return value;
+  }
+
+  // The Nikon maker note's lens data come in three layouts.
+  [[nodiscard]] std::optional<int> nikon_lens_integer(const std::string& name) const {
+    for (const char* group : {"Exif.NikonLd3.", "Exif.NikonLd2.", "Exif.NikonLd1."}) {
+      try {
+        if (const auto value = integer((group + name).c_str())) return value;
+      } catch (const Exiv2::Error&) {  // the group has no such entry
+      }
+    }
+    return std::nullopt;
+  }
+
+ private:
+  const Exiv2::ExifData& data_;
+};
+
+PhotographInfo info_from(const Exiv2::Image& image) {
+  PhotographInfo info;
+  info.width_px = image.pixelWidth();
+  info.height_px = image.pixelHeight();
+  const ExifReader exif(image.exifData());
+  info.make = exif.text("Exif.Image.Make");
+  info.model = exif.text("Exif.Image.Model");
+  info.serial = exif.text("Exif.Nikon3.SerialNumber");
+  if (!info.serial) info.serial = exif.text("Exif.Photo.BodySerialNumber");
+  info.lens = exif.text("Exif.Photo.LensModel");
+  if (!info.lens) info.lens = exif.text("Exif.Nikon3.Lens", true);
+  info.capture_time = exif.text("Exif.Photo.DateTimeOriginal");
+  info.lens_id = exif.nikon_lens_integer("LensIDNumber");
+  info.focus_distance_code = exif.nikon_lens_integer("FocusDistance");
+  info.focal_length_mm = exif.number("Exif.Photo.FocalLength");
+  info.f_number = exif.number("Exif.Photo.FNumber");
+  info.exposure_s = exif.number("Exif.Photo.ExposureTime");
+  info.iso = exif.integer("Exif.Photo.ISOSpeedRatings");
+  if (const auto reduction = exif.integer("Exif.NikonVr.VibrationReduction")) {
+    info.vibration_reduction = *reduction == 1;
+  }
+  return info;
+}
+
+}  // namespace
+
+PhotographInfo read_exif(std::string_view bytes) {
+  static std::once_flag prepared;
+  std::call_once(prepared, [] {
+    Exiv2::LogMsg::setLevel(Exiv2::LogMsg::mute);
+    Exiv2::XmpParser::initialize();  // not safe to leave to the first of several threads
+  });
+  try {
+    const auto image = Exiv2::ImageFactory::open(reinterpret_cast<const Exiv2::byte*>(bytes.data()),
+                                                 static_cast<long>(bytes.size()));
+    image->readMetadata();
+    return info_from(*image);
+  } catch (const std::exception&) {  // Exiv2 throws its own and the standard library's on damaged files
+    return {};
+  }
+}
+
+}  // namespace hexcal

@@ -1,0 +1,11 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace hexcal {
+
+/// SHA-256 (FIPS 180-4) in hexadecimal, 64 digits.
+[[nodiscard]] std::string sha256_hex(std::string_view bytes);
+
+}  // namespace hexcal
