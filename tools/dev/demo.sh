@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# The whole way on rendered photographs: a virtual Stewart platform with hidden errors is photographed, the camera is
+# calibrated, the poses are measured, the machine is identified, and the corrected commands are tried on the same
+# machine. Ends with two tables: measured against true poses, and errors before and after compensation.
+# Usage: tools/dev/demo.sh [FOLDER]   (default build/demo; an existing folder is replaced)
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+folder=${1:-build/demo}
+poses=${HEXCAL_DEMO_POSES:-24}
+width=${HEXCAL_DEMO_WIDTH:-3008}
+
+step() { printf '\n== %s\n' "$*"; }
+
+tools/dev/setup.sh
+step "build"
+cmake --preset release --log-level=WARNING
+cmake --build --preset release --target hexcal
+hexcal=build/release/hexcal
+
+rm -rf "$folder"
+step "photograph a virtual hexapod with hidden errors: home and $poses poses, 3 photographs each, and a template"
+"$hexcal" simulate -o "$folder/round1" --poses "$poses" --width "$width" --lens profile --focal-mm 35 --seed 66
+step "calibrate the camera"
+"$hexcal" camera "$folder/round1/calibration" --template "$folder/round1/sheet.yaml" -o "$folder/round1/camera.yaml"
+step "measure, compensate, report"
+"$hexcal" run "$folder/round1"
+step "second round: the same machine at the corrected commands"
+"$hexcal" simulate -o "$folder/round2" --from "$folder/round1" \
+  --commands "$folder/round1/results/actuators.csv" --no-images
+
+step "measured poses against the truth"
+"$hexcal" evaluate --targets "$folder/round1/truth/poses.csv" --before "$folder/round1/results/poses.csv"
+step "true errors of the machine before and after compensation"
+"$hexcal" evaluate --targets "$folder/round1/targets.csv" --before "$folder/round1/truth/poses.csv" \
+  --after "$folder/round2/truth/poses.csv"
