@@ -1,5 +1,8 @@
 #include "kinematics/platform.h"
 
+#include <Eigen/SVD>
+#include <cmath>
+
 namespace hexcal {
 
 Rigid3 PlatformGeometry::B_from_P(const Pose& pose) const {
@@ -45,6 +48,19 @@ LegVector lengths_from_readings(const PlatformGeometry& geometry, const LegVecto
     lengths[k] = geometry.actuators[i].offset_mm + geometry.actuators[i].mm_per_unit * readings[k];
   }
   return lengths;
+}
+
+Eigen::Vector3d platform_centroid_mm(const PlatformGeometry& geometry) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& joint : geometry.platform_joints_mm) sum += joint;
+  return sum / 6;
+}
+
+double characteristic_length_mm(const PlatformGeometry& geometry) {
+  const Eigen::Vector3d centroid = platform_centroid_mm(geometry);
+  double sum = 0;
+  for (const Eigen::Vector3d& joint : geometry.platform_joints_mm) sum += (joint - centroid).squaredNorm();
+  return std::sqrt(sum / 6);
 }
 
 }  // namespace hexcal
