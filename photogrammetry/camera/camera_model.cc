@@ -1,5 +1,6 @@
 #include "photogrammetry/camera/camera_model.h"
 
+#include <Eigen/LU>
 #include <array>
 #include <cmath>
 
@@ -228,7 +229,9 @@ std::optional<Eigen::Vector2d> CameraModel::normalised_from_image(const Eigen::V
 
 std::optional<Eigen::Vector2d> CameraModel::project(const Eigen::Vector3d& point_in_camera) const {
   if (!(point_in_camera.z() > 0)) return std::nullopt;
-  return image_from_normalised(point_in_camera.head<2>() / point_in_camera.z());
+  const Eigen::Vector2d normalised = point_in_camera.head<2>() / point_in_camera.z();
+  if (normalised.norm() > valid_radius) return std::nullopt;
+  return image_from_normalised(normalised);
 }
 
 }  // namespace hexcal

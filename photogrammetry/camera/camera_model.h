@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -34,6 +35,9 @@ struct CameraModel {
   LensModel lens = LensModel::brown;
   /// f_px, affinity b (fx = f (1 + b), fy = f), cx_px, cy_px, then the lens parameters of `lens`.
   Parameters parameters;
+  /// Largest undistorted radius r for which the model was fitted; project() gives nothing beyond, where a
+  /// polynomial may turn back into the frame.
+  double valid_radius = std::numeric_limits<double>::infinity();
 
   CameraModel() = default;
   /// Camera without distortion and with its principal point at the middle of the frame.
@@ -58,7 +62,7 @@ struct CameraModel {
   /// Normalised coordinates whose image is `px` (Newton, to 1e-13); none where the lens model has no inverse.
   [[nodiscard]] std::optional<Eigen::Vector2d> normalised_from_image(const Eigen::Vector2d& px) const;
 
-  /// Pixel of a point in the camera frame (mm); none behind the camera.
+  /// Pixel of a point in the camera frame (mm); none behind the camera or beyond `valid_radius`.
   [[nodiscard]] std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point_in_camera) const;
 
   [[nodiscard]] bool contains(const Eigen::Vector2d& px, double margin_px = 0.0) const {
