@@ -19,11 +19,13 @@ constexpr std::array kKinds{SheetKind::aprilgrid, SheetKind::chessboard, SheetKi
 // On a dots sheet every fourth node of every fourth row is a marker, so that any 4 x 4 nodes hold one.
 bool is_marker_node(int column, int row) { return column % 4 == 1 && row % 4 == 1; }
 
-// PhotoModeler's sheet rings the dots at these nodes of its 10 x 10 (columns and rows from the top left).
-bool is_ringed(const Sheet& sheet, int column, int row) {
-  const int far_column = sheet.columns - 3;
-  const int far_row = sheet.rows - 3;
-  return (column == 2 || column == far_column) && (row == 2 || row == far_row);
+// PhotoModeler's sheet rings the dots next to its four corners: 4 and 3 arcs at the top, 2 and 1 at the
+// bottom.
+int ring_arcs(const Sheet& sheet, int column, int row) {
+  const bool left = column == 1;
+  const bool top = row == 1;
+  if (!(left || column == sheet.columns - 2) || !(top || row == sheet.rows - 2)) return 0;
+  return (top ? 3 : 1) + (left ? 1 : 0);
 }
 
 bool is_black(const Sheet& sheet, int column, int row) {
@@ -101,8 +103,8 @@ SheetGeometry dot_grid(const Sheet& sheet) {
       if (sheet.kind == SheetKind::dots && is_marker_node(column, row)) {
         geometry.markers.push_back({id++, centre, sheet.marker_mm});
       } else {
-        const bool ringed = sheet.kind == SheetKind::photomodeler && is_ringed(sheet, column, row);
-        geometry.dots.push_back({column, row, centre, sheet.dot_mm, ringed ? 2.0 * sheet.dot_mm : 0.0});
+        const int arcs = sheet.kind == SheetKind::photomodeler ? ring_arcs(sheet, column, row) : 0;
+        geometry.dots.push_back({column, row, centre, sheet.dot_mm, arcs});
       }
     }
   }

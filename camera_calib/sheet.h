@@ -16,7 +16,8 @@ namespace hexcal {
 ///                 `top_left_white` (OpenCV's older boards with an even number of rows)
 ///   dots          black dots at a pitch, some replaced by markers so that any part of the sheet is
 ///   identified markers       markers to be cut out and glued on; as a template it counts like an aprilgrid
-///   with listed ids photomodeler  PhotoModeler's sheet: dots at a pitch, four of them ringed
+///   with listed ids photomodeler  PhotoModeler's sheet: dots at a pitch, four of them ringed (4 and 3 arcs
+///   at the top, 2 and 1 at the bottom)
 enum class SheetKind { aprilgrid, chessboard, charuco, dots, markers, photomodeler };
 
 [[nodiscard]] std::string_view sheet_kind_name(SheetKind kind);
@@ -60,13 +61,13 @@ struct SheetSquare {
   double size_mm = 0;
 };
 
-/// A filled black circle; `ring_mm` > 0 adds a black ring of that inner diameter and half a dot's radius
-/// thick.
+/// A filled black circle. PhotoModeler's ringed dots have a broken ring around them, from 1.3 to 2.1 dot
+/// diameters from the centre, whose number of arcs (1 to 4) tells them apart.
 struct SheetDot {
   int column = 0, row = 0;
   Eigen::Vector2d centre_mm = Eigen::Vector2d::Zero();
   double diameter_mm = 0;
-  double ring_mm = 0;
+  int ring_arcs = 0;
 };
 
 /// An inner corner of a chessboard, column and row counted from the printed top left.
