@@ -24,6 +24,19 @@ struct YamlMap::State {
 namespace {
 
 constexpr std::size_t kMaxYamlBytes = 16 << 20;
+constexpr int kMaxYamlDepth = 32;
+constexpr std::size_t kMaxYamlNodes = 1'000'000;
+
+// An alias may stand inside its own anchor, or multiply a small file into a huge tree.
+bool is_bounded(const YAML::Node& node, int depth, std::size_t& nodes) {
+  if (depth > kMaxYamlDepth || ++nodes > kMaxYamlNodes) return false;
+  if (!node.IsMap() && !node.IsSequence()) return true;
+  return std::all_of(node.begin(), node.end(), [&](const auto& entry) {
+    return node.IsSequence()
+               ? is_bounded(entry, depth + 1, nodes)
+               : is_bounded(entry.first, depth + 1, nodes) && is_bounded(entry.second, depth + 1, nodes);
+  });
+}
 
 std::string place(const std::filesystem::path& path, const YAML::Node& node) {
   return fmt::format("{}:{}", path.string(), node.Mark().line + 1);
@@ -74,6 +87,12 @@ YamlMap YamlMap::parse(const std::string& text, const std::filesystem::path& pat
     state->node = YAML::Load(text);
   } catch (const YAML::Exception& error) {
     throw InputError(fmt::format("{}:{}: not valid YAML: {}", path.string(), error.mark.line + 1, error.msg));
+  }
+  std::size_t nodes = 0;
+  if (!is_bounded(state->node, 0, nodes)) {
+    throw InputError(
+        fmt::format("{}: nested more than {} deep or longer than {} entries (an alias to itself?)",
+                    path.string(), kMaxYamlDepth, kMaxYamlNodes));
   }
   if (!state->node.IsMap()) {
     throw InputError(fmt::format("{}: found {}, wanted keys and values", path.string(), shown(state->node)));
