@@ -1,0 +1,390 @@
+#include "calibration/identify.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "calibration/frame_alignment.h"
+#include "calibration/normal_equations.h"
+#include "kinematics/geometry/covariance.h"
+#include "kinematics/geometry/input_error.h"
+
+namespace hexcal {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// 99.9 % point of chi squared with 6 degrees of freedom, and its median.
+constexpr double kOutlierSquares = 22.46;
+constexpr double kMedianSquares = 5.348;
+constexpr int kMinPosesForRobust = 10;
+
+double tolerance_of(const Tolerances& t, const ParameterLayout& layout, int index) {
+  switch (parameter_kind(layout, index)) {
+    case ParameterKind::joint:
+      return t.joint_mm;
+    case ParameterKind::offset:
+      return t.offset_mm;
+    case ParameterKind::scale:
+      return t.scale;
+    case ParameterKind::lead:
+      return t.lead_mm;
+    case ParameterKind::frame:
+      return kInfinity;
+    case ParameterKind::curve:
+      return t.curve_mm;
+    case ParameterKind::sag:
+      return index == layout.sag() ? t.sag_mm : t.sag_mm * 100.0;
+    case ParameterKind::backlash:
+      return t.backlash_mm;
+  }
+  return kInfinity;
+}
+
+bool is_free(const IdentifyOptions& options, const ParameterLayout& layout, int index) {
+  switch (parameter_kind(layout, index)) {
+    case ParameterKind::joint:
+      return options.geometry;
+    case ParameterKind::offset:
+      return true;
+    case ParameterKind::scale:
+      return options.scales;
+    case ParameterKind::lead:
+      return options.screw_lead;
+    case ParameterKind::frame:
+      return options.frames_unknown;
+    case ParameterKind::curve:
+      return true;
+    case ParameterKind::sag:
+      return options.sag;
+    case ParameterKind::backlash:
+      return options.backlash;
+  }
+  return false;
+}
+
+ParameterSelection select(const IdentifyOptions& options, const ParameterLayout& layout) {
+  ParameterSelection selection;
+  selection.free_of.assign(static_cast<std::size_t>(layout.size()), -1);
+  std::vector<int> leader_of_tie(options.tied.size(), -1);
+  for (int i = 0; i < layout.size(); ++i) {
+    const std::string parameter = parameter_name(layout, i);
+    if (!is_free(options, layout, i) || options.fixed.count(parameter) != 0) continue;
+    int& free = selection.free_of[static_cast<std::size_t>(i)];
+    for (std::size_t tie = 0; tie < options.tied.size(); ++tie) {
+      const auto& names = options.tied[tie];
+      if (std::find(names.begin(), names.end(), parameter) == names.end()) continue;
+      if (leader_of_tie[tie] < 0) leader_of_tie[tie] = selection.free_count++;
+      free = leader_of_tie[tie];
+    }
+    if (free < 0) free = selection.free_count++;
+  }
+  return selection;
+}
+
+// The state of one identification.
+class Identification {
+ public:
+  Identification(const PlatformGeometry& nominal, const ObservationSet& observations,
+                 const IdentifyOptions& options)
+      : observations_(observations), options_(options) {
+    nominal_.geometry = nominal;
+    result_.layout.curve_terms = options.curve_terms;
+    result_.selection = select(options, result_.layout);
+    result_.corrections.setZero(result_.layout.size());
+    result_.weights.assign(observations.poses.size(), 1.0);
+    result_.tolerances.setConstant(free_count(), kInfinity);
+    kinds_.resize(static_cast<std::size_t>(free_count()));
+    for (int i = 0; i < result_.layout.size(); ++i) {
+      const int free = result_.selection.free_of[static_cast<std::size_t>(i)];
+      if (free < 0) continue;
+      result_.tolerances[free] = tolerance_of(options.tolerances, result_.layout, i);
+      kinds_[static_cast<std::size_t>(free)] = parameter_kind(result_.layout, i);
+    }
+    initial_tolerances_ = result_.tolerances;
+    noise_.leg_sigma_mm = options.leg_sigma_mm;
+    for (Eigen::Index k = 0; k < 6; ++k) {
+      result_.stroke_range(k, 0) = kInfinity;
+      result_.stroke_range(k, 1) = -kInfinity;
+      for (const PoseObservation& pose : observations.poses) {
+        result_.stroke_range(k, 0) = std::min(result_.stroke_range(k, 0), pose.readings[k]);
+        result_.stroke_range(k, 1) = std::max(result_.stroke_range(k, 1), pose.readings[k]);
+      }
+    }
+  }
+
+  IdentifyResult run() {
+    if (options_.frames_unknown) {
+      const auto frames = align_frames(nominal_.geometry, observations_);
+      if (!frames) {
+        result_.reason = "the frames of the measured poses cannot be aligned with the hexapod's";
+        return result_;
+      }
+      nominal_.geometry.B_from_UG = frames->B_from_UG;
+      nominal_.geometry.P_from_LG = frames->P_from_LG;
+    }
+    filled_.resize(observations_.poses.size());
+    for (std::size_t i = 0; i < filled_.size(); ++i) filled_[i] = observations_.poses[i].measured;
+    bool settled = false;
+    for (int i = 1; i <= options_.max_iterations; ++i) {
+      result_.iterations = i;
+      const bool hyper = i >= 3 && !settled;
+      if (!linearize() || !step(hyper)) return result_;
+      // Noise and tolerances first settle beside the parameters; then the parameters converge under them.
+      if (hyper && (hyper_change_ < 2e-3 || i > options_.max_iterations - 15)) settled = true;
+      if (settled && step_squares_ < 1e-16 * std::max(1.0, rows_)) {
+        finish();
+        return result_;
+      }
+    }
+    if (step_squares_ < 1e-6 * rows_) {
+      finish();
+    } else {
+      result_.reason = fmt::format("no convergence in {} iterations", options_.max_iterations);
+    }
+    return result_;
+  }
+
+ private:
+  int free_count() const { return result_.selection.free_count; }
+
+  bool linearize() {
+    result_.machine = corrected_machine(nominal_, result_.layout, result_.corrections, result_.stroke_range);
+    reduced_.clear();
+    for (std::size_t i = 0; i < observations_.poses.size(); ++i) {
+      const PoseObservation& pose = observations_.poses[i];
+      fill_missing(i);
+      const LegLinearization legs =
+          linearize_legs(result_.machine, nominal_, result_.layout, result_.stroke_range, filled_[i],
+                         pose.readings, pose.approach);
+      if (!legs.residuals_mm.allFinite() || !legs.jacobian.allFinite()) {
+        result_.reason = fmt::format("pose {}: the machine is singular there", pose.id);
+        return false;
+      }
+      reduced_.push_back(reduce_to_observed(legs, pose.observed, result_.selection));
+    }
+    return true;
+  }
+
+  // Coordinates that were not measured take the value at which the legs fit best, to first order.
+  void fill_missing(std::size_t i) {
+    const PoseObservation& pose = observations_.poses[i];
+    if (pose.complete()) return;
+    const auto start = result_.iterations <= 1 && pose.target ? *pose.target : filled_[i];
+    const auto modelled = machine_pose(result_.machine, pose.readings, start, pose.approach);
+    if (!modelled) return;
+    Vector6d v = pose.measured.vector();
+    for (Eigen::Index k = 0; k < 6; ++k)
+      if (!pose.observed[static_cast<std::size_t>(k)]) v[k] = modelled->vector()[k];
+    filled_[i] = Pose::from_vector(v);
+  }
+
+  // One Gauss-Newton step; afterwards, where asked, one update of weights, noise and tolerances.
+  bool step(bool hyper) {
+    const NormalEquationsRequest request{.components = hyper, .information_of_pose = false};
+    equations_ = normal_equations(reduced_, observations_, result_.weights, noise_, request);
+    rows_ = equations_.rows;
+    Eigen::VectorXd prior_gradient = Eigen::VectorXd::Zero(free_count());
+    Eigen::MatrixXd information = equations_.information;
+    Eigen::VectorXd at = free_corrections();
+    for (Eigen::Index j = 0; j < free_count(); ++j) {
+      if (!std::isfinite(result_.tolerances[j])) continue;
+      const double weight = 1.0 / (result_.tolerances[j] * result_.tolerances[j]);
+      information(j, j) += weight;
+      prior_gradient[j] = weight * at[j];
+    }
+    // Scaled to unit diagonal: millimetres, relative scales and radians differ by orders of magnitude.
+    const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
+    Eigen::LDLT<Eigen::MatrixXd> ldlt(scaled);
+    const double smallest = ldlt.vectorD().minCoeff();
+    if (smallest <= 1e-14) {  // a frame that nothing determines: hold it by a trace of a prior
+      ldlt.compute(scaled + 1e-9 * Eigen::MatrixXd::Identity(free_count(), free_count()));
+    }
+    const Eigen::VectorXd delta =
+        -(scale.asDiagonal() * ldlt.solve(scale.asDiagonal() * (equations_.gradient + prior_gradient)));
+    if (!delta.allFinite()) {
+      result_.reason = "the equations have no finite solution";
+      return false;
+    }
+    step_squares_ = delta.dot(information * delta);
+    covariance_ = scale.asDiagonal() * ldlt.solve(Eigen::MatrixXd::Identity(free_count(), free_count())) *
+                  scale.asDiagonal();
+    if (hyper) update_noise_and_tolerances(at);
+    for (int i = 0; i < result_.layout.size(); ++i) {
+      const int free = result_.selection.free_of[static_cast<std::size_t>(i)];
+      if (free >= 0) result_.corrections[i] += delta[free];
+    }
+    absorb_frames();
+    return true;
+  }
+
+  // Perturbations of the frames move into the nominal frames, where the next step linearises.
+  void absorb_frames() {
+    if (!options_.frames_unknown) return;
+    auto base = result_.corrections.segment<6>(ParameterLayout::kBaseFrame);
+    auto grip = result_.corrections.segment<6>(ParameterLayout::kGripFrame);
+    nominal_.geometry.B_from_UG = perturbed(nominal_.geometry.B_from_UG, base);
+    nominal_.geometry.P_from_LG = perturbed(nominal_.geometry.P_from_LG, grip);
+    base.setZero();
+    grip.setZero();
+  }
+
+  Eigen::VectorXd free_corrections() const {
+    Eigen::VectorXd at = Eigen::VectorXd::Zero(free_count());
+    for (int i = 0; i < result_.layout.size(); ++i) {
+      const int free = result_.selection.free_of[static_cast<std::size_t>(i)];
+      if (free >= 0) at[free] = result_.corrections[i];
+    }
+    return at;
+  }
+
+  void update_noise_and_tolerances(const Eigen::VectorXd& at) {
+    hyper_change_ = 0;
+    const auto scaled_by = [&](double& value, double factor, double low, double high) {
+      const double next = std::clamp(value * std::sqrt(std::clamp(factor, 1e-8, 1e8)), low, high);
+      if (value > 0) hyper_change_ = std::max(hyper_change_, std::abs(std::log(next / value)));
+      value = next;
+    };
+    update_weights();
+    // Without redundancy the residuals say nothing about noise.
+    const double redundancy = equations_.rows - equations_.information.cwiseProduct(covariance_).sum();
+    if (redundancy > 3) {
+      if (!observations_.covariance_known) {
+        scaled_by(noise_.position_factor, equations_.position.factor(covariance_), 1e-6, 1e6);
+        scaled_by(noise_.orientation_factor, equations_.orientation.factor(covariance_), 1e-6, 1e6);
+      } else if (options_.estimate_leg_sigma) {
+        scaled_by(noise_.leg_sigma_mm, equations_.leg.factor(covariance_), 0.01 * options_.leg_sigma_mm, 1e3);
+        // The smallest values differ in nothing.
+        if (noise_.leg_sigma_mm < 0.1 * options_.leg_sigma_mm) hyper_change_ = 0;
+      }
+    }
+    if (!options_.adapt_tolerances) return;
+    for (const ParameterKind kind : {ParameterKind::joint, ParameterKind::offset, ParameterKind::scale,
+                                     ParameterKind::curve, ParameterKind::sag, ParameterKind::backlash}) {
+      double determined = 0;
+      double squares = 0;
+      for (Eigen::Index j = 0; j < free_count(); ++j) {
+        if (kinds_[static_cast<std::size_t>(j)] != kind) continue;
+        const double t = result_.tolerances[j];
+        determined += std::max(0.0, 1.0 - covariance_(j, j) / (t * t));
+        squares += at[j] * at[j] / (t * t);
+      }
+      if (determined < 2) continue;  // too little evidence to judge a tolerance
+      double factor = 1;
+      scaled_by(factor, squares / determined, 0.2, 5);
+      for (Eigen::Index j = 0; j < free_count(); ++j) {
+        if (kinds_[static_cast<std::size_t>(j)] != kind) continue;
+        result_.tolerances[j] = std::clamp(result_.tolerances[j] * factor, 0.01 * initial_tolerances_[j],
+                                           20 * initial_tolerances_[j]);
+      }
+    }
+  }
+
+  // Redescending weights; the scale follows the median, so that a model that lacks something everywhere does
+  // not lose half of its poses.
+  void update_weights() {
+    const std::size_t n = observations_.poses.size();
+    if (!options_.robust || n < kMinPosesForRobust) return;
+    std::vector<double> normed(n);
+    for (std::size_t i = 0; i < n; ++i)
+      normed[i] = equations_.squares_of_pose[i] * 6.0 / static_cast<double>(reduced_[i].residuals.size());
+    std::vector<double> sorted = normed;
+    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(n / 2), sorted.end());
+    const double limit = kOutlierSquares * std::max(1.0, sorted[n / 2] / kMedianSquares);
+    for (std::size_t i = 0; i < n; ++i)
+      result_.weights[i] =
+          observations_.poses[i].is_definition || normed[i] <= limit ? 1.0 : limit / normed[i];
+  }
+
+  void finish() {
+    linearize();
+    equations_ = normal_equations(reduced_, observations_, result_.weights, noise_,
+                                  {.components = false, .information_of_pose = true});
+    result_.status = IdentifyStatus::identified;
+    result_.reason.clear();
+    result_.covariance = covariance_;
+    result_.data_information = equations_.information;
+    result_.effective_parameters = equations_.information.cwiseProduct(covariance_).sum();
+    const double redundancy = std::max(1.0, equations_.rows - result_.effective_parameters);
+    result_.sigma0 = std::sqrt(equations_.squares / redundancy);
+    NoiseModel measured_only = noise_;
+    measured_only.leg_sigma_mm = std::min(noise_.leg_sigma_mm, options_.leg_sigma_mm);
+    result_.sigma0_of_measurement = std::sqrt(
+        normal_equations(reduced_, observations_, result_.weights, measured_only).squares / redundancy);
+    result_.leg_sigma_mm = noise_.leg_sigma_mm;
+    double position = 0;
+    double orientation = 0;
+    const double n = static_cast<double>(observations_.poses.size());
+    for (std::size_t i = 0; i < observations_.poses.size(); ++i) {
+      const PoseObservation& pose = observations_.poses[i];
+      const Matrix6d noise = pose_covariance(observations_, i, noise_);
+      position += noise.diagonal().head<3>().sum() / (3 * n);
+      orientation += noise.diagonal().tail<3>().sum() / (3 * n);
+      const LegLinearization legs =
+          linearize_legs(result_.machine, nominal_, result_.layout, result_.stroke_range, filled_[i],
+                         pose.readings, pose.approach);
+      result_.leg_residuals_mm.push_back(legs.residuals_mm);
+      result_.pose_residuals.emplace_back(legs.by_pose.partialPivLu().solve(legs.residuals_mm));
+      result_.influence.push_back(equations_.information_of_pose[i].cwiseProduct(covariance_).sum() /
+                                  std::max(1e-300, result_.effective_parameters));
+    }
+    result_.position_sigma_mm = std::sqrt(position);
+    result_.orientation_sigma_rad = std::sqrt(orientation);
+  }
+
+  const ObservationSet& observations_;
+  const IdentifyOptions& options_;
+  MachineModel nominal_;
+  IdentifyResult result_;
+  NoiseModel noise_;
+  std::vector<ParameterKind> kinds_;
+  Eigen::VectorXd initial_tolerances_;
+  std::vector<Pose> filled_;
+  std::vector<ReducedPose> reduced_;
+  NormalEquations equations_;
+  Eigen::MatrixXd covariance_;
+  double rows_ = 0;
+  double step_squares_ = kInfinity;
+  double hyper_change_ = 0;
+};
+
+}  // namespace
+
+void IdentifyOptions::validate() const {
+  const auto positive = [](double value, const char* field) {
+    if (!(value > 0)) throw InputError(fmt::format("{}: found {}, wanted more than 0", field, value));
+  };
+  positive(tolerances.joint_mm, "joint_mm");
+  positive(tolerances.offset_mm, "offset_mm");
+  positive(tolerances.scale, "scale");
+  positive(tolerances.lead_mm, "lead_mm");
+  positive(tolerances.curve_mm, "curve_mm");
+  positive(tolerances.sag_mm, "sag_mm");
+  positive(tolerances.backlash_mm, "backlash_mm");
+  positive(leg_sigma_mm, "leg_sigma_mm");
+  positive(max_iterations, "max_iterations");
+  if (curve_terms < 0 || curve_terms > 12)
+    throw InputError(fmt::format("curve_terms: found {}, wanted 0 to 12", curve_terms));
+  const ParameterLayout layout{curve_terms};
+  std::set<std::string> known;
+  for (int i = 0; i < layout.size(); ++i) known.insert(parameter_name(layout, i));
+  std::vector<std::vector<std::string>> named = tied;
+  named.emplace_back(fixed.begin(), fixed.end());
+  for (const auto& names : named) {
+    for (const std::string& parameter : names) {
+      if (known.count(parameter) == 0)
+        throw InputError(fmt::format("'{}' is no parameter, wanted for instance 'leg 1 base x'", parameter));
+    }
+  }
+}
+
+IdentifyResult identify(const PlatformGeometry& nominal, const ObservationSet& observations,
+                        const IdentifyOptions& options) {
+  options.validate();
+  return Identification(nominal, observations, options).run();
+}
+
+}  // namespace hexcal

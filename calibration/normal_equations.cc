@@ -1,0 +1,159 @@
+#include "calibration/normal_equations.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <cmath>
+
+namespace hexcal {
+namespace {
+
+Vector6d noise_factors(const NoiseModel& noise) {
+  Vector6d factors;
+  factors << Eigen::Vector3d::Constant(noise.position_factor),
+      Eigen::Vector3d::Constant(noise.orientation_factor);
+  return factors;
+}
+
+// A covariance may be singular, and is zero for the defining home pose: a part of the legs' own noise that no
+// measurement resolves keeps its Cholesky factor alive.
+void add_leg_noise(Eigen::MatrixXd& covariance, const NoiseModel& noise) {
+  constexpr double kFloorMm = 1e-9;
+  const double variance = std::max(noise.leg_sigma_mm * noise.leg_sigma_mm, kFloorMm * kFloorMm);
+  covariance.diagonal().array() += variance;
+}
+
+void add_component(NormalEquations::Component& component, const Eigen::MatrixXd& factor,
+                   const Eigen::LLT<Eigen::MatrixXd>& llt, const Eigen::VectorXd& residuals,
+                   const Eigen::MatrixXd& jacobian, double weight) {
+  const Eigen::MatrixXd white_factor = llt.matrixL().solve(factor);
+  const Eigen::MatrixXd projected = white_factor.transpose() * jacobian;
+  component.quadratic += (white_factor.transpose() * residuals).squaredNorm();
+  component.trace += weight * white_factor.squaredNorm();
+  component.information.selfadjointView<Eigen::Lower>().rankUpdate(projected.transpose());
+}
+
+}  // namespace
+
+ReducedPose reduce_to_observed(const LegLinearization& legs, const std::array<bool, 6>& observed,
+                               const ParameterSelection& selection) {
+  ReducedPose reduced;
+  reduced.residuals = legs.residuals_mm;
+  reduced.jacobian.setZero(6, selection.free_count);
+  for (std::size_t j = 0; j < selection.free_of.size(); ++j) {
+    if (selection.free_of[j] >= 0)
+      reduced.jacobian.col(selection.free_of[j]) += legs.jacobian.col(static_cast<Eigen::Index>(j));
+  }
+  reduced.by_pose = legs.by_pose;
+  Eigen::Index missing = 0;
+  Eigen::MatrixXd by_missing(6, 6);
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    if (observed[static_cast<std::size_t>(i)]) continue;
+    by_missing.col(missing++) = legs.by_pose.col(i);
+    reduced.by_pose.col(i).setZero();
+  }
+  if (missing == 0) return reduced;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(by_missing.leftCols(missing));
+  const Eigen::MatrixXd q = qr.householderQ();
+  const Eigen::MatrixXd keep = q.rightCols(6 - missing).transpose();
+  reduced.residuals = keep * reduced.residuals;
+  reduced.jacobian = keep * reduced.jacobian;
+  reduced.by_pose = keep * reduced.by_pose;
+  return reduced;
+}
+
+Matrix6d pose_covariance(const ObservationSet& observations, std::size_t index, const NoiseModel& noise) {
+  const Vector6d factors = noise_factors(noise);
+  return factors.asDiagonal() * observations.covariance(index) * factors.asDiagonal();
+}
+
+double NormalEquations::Component::factor(const Eigen::MatrixXd& posterior) const {
+  const Eigen::MatrixXd full = information.selfadjointView<Eigen::Lower>();
+  const double redundancy = trace - posterior.cwiseProduct(full).sum();
+  return redundancy > 1e-6 * trace ? quadratic / redundancy : 1.0;
+}
+
+NormalEquations normal_equations(const std::vector<ReducedPose>& reduced, const ObservationSet& observations,
+                                 const std::vector<double>& weights, const NoiseModel& noise,
+                                 const NormalEquationsRequest& request) {
+  const Eigen::Index parameters = reduced.empty() ? 0 : reduced[0].jacobian.cols();
+  NormalEquations sums;
+  sums.information.setZero(parameters, parameters);
+  sums.gradient.setZero(parameters);
+  for (auto* component : {&sums.leg, &sums.position, &sums.orientation})
+    component->information.setZero(parameters, parameters);
+  sums.squares_of_pose.resize(reduced.size());
+  const bool joint = observations.joint_covariance.size() > 0;
+
+  const auto add = [&](Eigen::VectorXd residuals, Eigen::MatrixXd jacobian, const Eigen::MatrixXd& covariance,
+                       double weight) {
+    const Eigen::LLT<Eigen::MatrixXd> llt(covariance);
+    llt.matrixL().solveInPlace(residuals);
+    llt.matrixL().solveInPlace(jacobian);
+    sums.information.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose());
+    sums.gradient.noalias() += jacobian.transpose() * residuals;
+    sums.squares += residuals.squaredNorm();
+    if (request.components) {
+      const Eigen::Index m = residuals.size();
+      add_component(sums.leg, noise.leg_sigma_mm * Eigen::MatrixXd::Identity(m, m), llt, residuals, jacobian,
+                    weight);
+    }
+    return llt;
+  };
+
+  Eigen::Index rows = 0;
+  for (std::size_t i = 0; i < reduced.size(); ++i) {
+    const ReducedPose& pose = reduced[i];
+    const double root = std::sqrt(weights[i]);
+    Eigen::MatrixXd covariance =
+        pose.by_pose * pose_covariance(observations, i, noise) * pose.by_pose.transpose();
+    add_leg_noise(covariance, noise);
+    rows += pose.residuals.size();
+    sums.rows += weights[i] * static_cast<double>(pose.residuals.size());
+    sums.squares_of_pose[i] =
+        pose.residuals.dot(Eigen::LLT<Eigen::MatrixXd>(covariance).solve(pose.residuals));
+    if (request.information_of_pose) {
+      const Eigen::LLT<Eigen::MatrixXd> llt(covariance);
+      const Eigen::MatrixXd white = llt.matrixL().solve(pose.jacobian);
+      sums.information_of_pose.push_back(weights[i] * white.transpose() * white);
+    }
+    if (joint) continue;
+    const auto llt = add(root * pose.residuals, root * pose.jacobian, covariance, weights[i]);
+    if (request.components && !observations.covariance_known) {
+      const Eigen::MatrixXd root_covariance =
+          pose.by_pose *
+          Eigen::MatrixXd(pose_covariance(observations, i, noise).diagonal().cwiseSqrt().asDiagonal());
+      Eigen::VectorXd white_residuals = llt.matrixL().solve(root * pose.residuals);
+      Eigen::MatrixXd white_jacobian = llt.matrixL().solve(root * pose.jacobian);
+      add_component(sums.position, root_covariance.leftCols(3), llt, white_residuals, white_jacobian,
+                    weights[i]);
+      add_component(sums.orientation, root_covariance.rightCols(3), llt, white_residuals, white_jacobian,
+                    weights[i]);
+    }
+  }
+  if (joint) {
+    const auto n = static_cast<Eigen::Index>(6 * reduced.size());
+    Eigen::MatrixXd by_pose = Eigen::MatrixXd::Zero(rows, n);
+    Eigen::VectorXd residuals(rows);
+    Eigen::MatrixXd jacobian(rows, parameters);
+    Eigen::Index at = 0;
+    double mean_weight = 0;
+    for (std::size_t i = 0; i < reduced.size(); ++i) {
+      const ReducedPose& pose = reduced[i];
+      const Eigen::Index m = pose.residuals.size();
+      const double root = std::sqrt(weights[i]);
+      by_pose.block(at, 6 * static_cast<Eigen::Index>(i), m, 6) = pose.by_pose;
+      residuals.segment(at, m) = root * pose.residuals;
+      jacobian.middleRows(at, m) = root * pose.jacobian;
+      mean_weight += weights[i] / static_cast<double>(reduced.size());
+      at += m;
+    }
+    Eigen::MatrixXd covariance = by_pose * observations.joint_covariance * by_pose.transpose();
+    add_leg_noise(covariance, noise);
+    add(std::move(residuals), std::move(jacobian), covariance, mean_weight);
+  }
+  const Eigen::MatrixXd lower = sums.information;
+  sums.information = lower.selfadjointView<Eigen::Lower>();
+  return sums;
+}
+
+}  // namespace hexcal
