@@ -7,7 +7,7 @@ packages=(
   g++ cmake ninja-build ccache pkg-config git python3 clang-format
   # libraries
   libopencv-dev libceres-dev libeigen3-dev libapriltag-dev libpcl-dev libfmt-dev libcli11-dev libyaml-cpp-dev
-  nlohmann-json3-dev libexiv2-dev libraw-dev libcairo2-dev libtbb-dev libjpeg-dev libssl-dev
+  nlohmann-json3-dev libexiv2-dev libraw-dev libcairo2-dev libtbb-dev libjpeg-dev libssl-dev libjs-three
   # tests
   libgtest-dev libgmock-dev libbenchmark-dev liblensfun-dev liblensfun-data-v1 poppler-utils opencv-doc
 )

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "tools/report/chart.h"
+
+namespace hexcal {
+
+/// Markup that is safe to put into a page. It is made from text by html_text() (which escapes) and from the
+/// report's own building blocks, never from a user's file directly.
+struct Html {
+  std::string source;
+  Html& operator+=(const Html& more) {
+    source += more.source;
+    return *this;
+  }
+};
+
+[[nodiscard]] Html html_text(std::string_view text);
+/// Element with quoted attributes; `tag` and the attributes' names are literals of the program.
+[[nodiscard]] Html html_element(std::string_view tag, const Html& content,
+                                const std::vector<std::pair<std::string_view, std::string>>& attributes = {});
+[[nodiscard]] Html html_paragraph(std::string_view text);
+
+/// A traffic light in shape and words as well as in colour.
+enum class Light { none, good, warning, bad };
+[[nodiscard]] const char* light_words(Light light);
+
+struct HtmlCell {
+  std::string text;
+  std::optional<double> sort_key;  ///< default: the text
+  Light light = Light::none;
+  std::string hint;  ///< shown when pointed at
+};
+/// A cell with a number shown to `decimals` places, sorted by its value; NaN is an empty cell.
+[[nodiscard]] HtmlCell number_cell(double value, int decimals);
+
+struct HtmlTable {
+  struct Column {
+    std::string title;
+    std::string unit;     ///< second line of the header
+    bool numeric = true;  ///< right-aligned
+    std::string hint;
+  };
+  std::string caption;
+  std::vector<Column> columns;
+  std::vector<std::vector<HtmlCell>> rows;
+  bool sortable = true;
+  std::size_t highlighted = SIZE_MAX;  ///< row drawn strong
+};
+[[nodiscard]] Html html_table(const HtmlTable& table);
+
+/// Terms with their values, for short lists of facts.
+[[nodiscard]] Html html_facts(const std::vector<std::pair<std::string, std::string>>& facts);
+
+/// A chart with its title and caption.
+[[nodiscard]] Html html_figure(const Chart& chart);
+
+/// The first thing on the page: one sentence, why, and what to do next.
+struct Verdict {
+  Light light = Light::none;
+  std::string headline;
+  std::vector<std::string> findings;    ///< what is wrong or noteworthy, worst first
+  std::vector<std::string> next_steps;  ///< in the imperative; commands in `backquotes`
+};
+[[nodiscard]] Html html_verdict(const Verdict& verdict);
+
+struct HtmlSection {
+  std::string id;  ///< anchor: letters, digits and -
+  std::string title;
+  Html content;
+};
+
+/// A page that needs nothing else: style and scripts are inside, nothing is loaded from a network.
+struct HtmlPage {
+  std::string title;
+  std::string subtitle;
+  Html verdict;
+  std::vector<HtmlSection> sections;
+  bool with_scene = false;  ///< puts the 3D library and the viewer's script in
+};
+[[nodiscard]] std::string render_page(const HtmlPage& page);
+
+}  // namespace hexcal
