@@ -21,8 +21,6 @@ struct ForwardOptions {
   int max_iterations = 50;      ///< Newton steps in one solve
   double smallest_step = 1e-4;  ///< of the way from home, below which the continuation gives up
   bool enforce_limits = false;  ///< report left_workspace where strokes or joint limits are broken
-  double singular_mm =
-      1e-6;  ///< smallest singular value of the Jacobian (characteristic length) that is not singular
 
   /// Throws InputError naming the field.
   void validate() const;
@@ -37,6 +35,8 @@ struct ForwardResult {
   double residual_mm = 0;  ///< largest leg residual at B_from_P
 };
 
+/// The lengths are those that the actuators make (offset + mm_per_unit q), screws included.
+///
 /// The pose with these leg lengths that Newton's method reaches from B_from_P_start, on SE(3) with the
 /// multiplicative update of covariance.h.
 [[nodiscard]] ForwardResult forward_kinematics(const PlatformGeometry& geometry, const LegVector& lengths_mm,

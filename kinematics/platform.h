@@ -27,9 +27,8 @@ struct JointLimits {
   std::optional<std::array<double, 2>> base_axes_rad = std::nullopt;
 };
 
-/// Passive rotation of the nuts: a leg that twists by w between its two joints changes its length by
-/// lead w / 2 pi (Huang et al., Mech. Sci. 12, 2021; the twist as in LinuxCNC's genhexkins). The twist is
-/// counted from home.
+/// Passive rotation of the nuts: a leg that twists by w between its two joints reads lead w / 2 pi longer
+/// (Huang et al., Mech. Sci. 12, 2021; sign and twist as in LinuxCNC's genhexkins); see screw.h.
 struct ScrewLead {
   double lead_mm = 0;                        ///< per revolution, positive for a right-hand screw
   std::array<Eigen::Vector3d, 6> base_axes;  ///< unit, in B: the U joint's axis that is fixed to the base

@@ -1,0 +1,92 @@
+#include "kinematics/singularity.h"
+
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <cmath>
+#include <limits>
+
+#include "kinematics/geometry/covariance.h"
+#include "kinematics/geometry/input_error.h"
+
+namespace hexcal {
+namespace {
+
+// d(sigma)/d(dt, length dr) for a singular triple: left^T (dJ) right, with dJ of each row from
+//   du = (I - u u^T)/l (dt + dr x arm),  d(arm) = dr x arm.
+Vector6d sigma_gradient(const PlatformGeometry& geometry, const Rigid3& B_from_P, double length_mm,
+                        const Vector6d& left, const Vector6d& right) {
+  const Eigen::Vector3d centroid = platform_centroid_mm(geometry);
+  const Eigen::Vector3d v = right.head<3>();
+  const Eigen::Vector3d w = right.tail<3>() / length_mm;
+  Vector6d gradient = Vector6d::Zero();
+  for (std::size_t i = 0; i < 6; ++i) {
+    const Eigen::Vector3d arm = B_from_P.rotation * (geometry.platform_joints_mm[i] - centroid);
+    const Eigen::Vector3d d = B_from_P * geometry.platform_joints_mm[i] - geometry.base_joints_mm[i];
+    const Eigen::Vector3d u = d.normalized();
+    // row . right = u . (v + w x arm) = u . s
+    const Eigen::Vector3d s = v + w.cross(arm);
+    const Eigen::Vector3d by_joint = (s - u * u.dot(s)) / d.norm();
+    const Eigen::Vector3d by_arm = u.cross(w);
+    const double weight = left[static_cast<Eigen::Index>(i)];
+    gradient.head<3>() += weight * by_joint;
+    gradient.tail<3>() += weight * arm.cross(by_joint + by_arm) / length_mm;
+  }
+  return gradient;
+}
+
+}  // namespace
+
+void SingularityOptions::validate() const {
+  if (!(characteristic_length_mm >= 0) || !std::isfinite(characteristic_length_mm))
+    throw InputError("SingularityOptions.characteristic_length_mm must not be negative");
+  if (!(near_mm >= 0)) throw InputError("SingularityOptions.near_mm must not be negative");
+  if (!(near_deg >= 0)) throw InputError("SingularityOptions.near_deg must not be negative");
+  if (!(near_gain >= 1)) throw InputError("SingularityOptions.near_gain must be at least 1");
+}
+
+Matrix6d scaled_jacobian(const PlatformGeometry& geometry, const Rigid3& B_from_P,
+                         double characteristic_length_mm) {
+  const Eigen::Vector3d centroid = platform_centroid_mm(geometry);
+  Matrix6d j;
+  for (std::size_t i = 0; i < 6; ++i) {
+    const Eigen::Vector3d arm = B_from_P.rotation * (geometry.platform_joints_mm[i] - centroid);
+    const Eigen::Vector3d u =
+        (B_from_P * geometry.platform_joints_mm[i] - geometry.base_joints_mm[i]).normalized();
+    j.row(static_cast<Eigen::Index>(i)) << u.transpose(), arm.cross(u).transpose() / characteristic_length_mm;
+  }
+  return j;
+}
+
+SingularityMeasures singularity_measures(const PlatformGeometry& geometry, const Rigid3& B_from_P,
+                                         const SingularityOptions& options) {
+  options.validate();
+  SingularityMeasures m;
+  m.characteristic_length_mm = options.characteristic_length_mm > 0 ? options.characteristic_length_mm
+                                                                    : characteristic_length_mm(geometry);
+  const double length_mm = m.characteristic_length_mm;
+  const Matrix6d j = scaled_jacobian(geometry, B_from_P, length_mm);
+  const Matrix6d home_j = scaled_jacobian(geometry, geometry.home_B_from_P(), length_mm);
+  const Eigen::JacobiSVD<Matrix6d> svd(j, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Vector6d sigma = svd.singularValues();
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  m.determinant = j.determinant();
+  m.sigma_min = sigma[5];
+  m.condition = sigma[5] > 0 ? sigma[0] / sigma[5] : kFar;
+  m.weakest_motion = svd.matrixV().col(5);
+  m.worst_gain_mm = sigma[5] > 0 ? m.weakest_motion.head<3>().norm() / sigma[5] : kFar;
+  m.worst_gain_deg =
+      sigma[5] > 0 ? m.weakest_motion.tail<3>().norm() / sigma[5] / length_mm * kDegPerRad : kFar;
+  const Vector6d gradient =
+      sigma_gradient(geometry, B_from_P, length_mm, svd.matrixU().col(5), m.weakest_motion);
+  const double by_mm = gradient.head<3>().norm();
+  const double by_rad = gradient.tail<3>().norm() * length_mm;
+  m.distance_mm = by_mm > 0 ? sigma[5] / by_mm : kFar;
+  m.distance_deg = by_rad > 0 ? sigma[5] / by_rad * kDegPerRad : kFar;
+  m.same_side_as_home = m.determinant * home_j.determinant() > 0;
+  const double home_sigma = home_j.jacobiSvd().singularValues()[5];
+  m.near_singular = m.distance_mm < options.near_mm || m.distance_deg < options.near_deg ||
+                    m.sigma_min * options.near_gain < home_sigma;
+  return m;
+}
+
+}  // namespace hexcal
