@@ -108,12 +108,13 @@ const char* name(PoseVerdict verdict) {
 }
 
 RestState::RestState(const PlatformGeometry& geometry)
-    : home(geometry.home_B_from_P()), chains(leg_chains(geometry)) {
+    : home(geometry.home_B_from_P()),
+      chains(leg_chains(geometry)),
+      home_singularity(geometry, characteristic_length_mm(geometry)) {
   for (std::size_t i = 0; i < 6; ++i) {
     base_rest[i] = (home * geometry.platform_joints_mm[i] - geometry.base_joints_mm[i]).normalized();
     platform_rest[i] = home.rotation.conjugate() * base_rest[i];
   }
-  home_determinant = leg_jacobian(geometry, home).determinant();
 }
 
 InverseResult inverse_kinematics(const PlatformGeometry& geometry, const RestState& rest,
@@ -160,10 +161,12 @@ InverseResult inverse_kinematics(const PlatformGeometry& geometry, const RestSta
   result.clearance_mm = clearance.mm;
   bool same_side = true;
   if (options.singularity) {
-    result.singularity = singularity_measures(geometry, B_from_P, options.near);
+    result.singularity = options.near.characteristic_length_mm > 0
+                             ? singularity_measures(geometry, B_from_P, options.near)
+                             : singularity_measures(geometry, rest.home_singularity, B_from_P, options.near);
     same_side = result.singularity->same_side_as_home;
   } else {
-    same_side = leg_jacobian(geometry, B_from_P).determinant() * rest.home_determinant > 0;
+    same_side = leg_jacobian(geometry, B_from_P).determinant() * rest.home_singularity.determinant > 0;
   }
 
   const auto broken = [&result](PoseVerdict verdict, int leg) {

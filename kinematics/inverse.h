@@ -32,7 +32,7 @@ struct RestState {
   std::array<Eigen::Vector3d, 6> base_rest;      ///< unit leg directions at home, in B
   std::array<Eigen::Vector3d, 6> platform_rest;  ///< and in P
   std::array<LegChain, 6> chains;                ///< their A frames carry the base joints' axes
-  double home_determinant = 0;
+  HomeSingularity home_singularity;              ///< by the default characteristic length
 };
 
 struct InverseOptions {

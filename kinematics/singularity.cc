@@ -34,6 +34,11 @@ Vector6d sigma_gradient(const PlatformGeometry& geometry, const Rigid3& B_from_P
   return gradient;
 }
 
+double length_used_mm(const PlatformGeometry& geometry, const SingularityOptions& options) {
+  return options.characteristic_length_mm > 0 ? options.characteristic_length_mm
+                                              : characteristic_length_mm(geometry);
+}
+
 }  // namespace
 
 void SingularityOptions::validate() const {
@@ -57,15 +62,25 @@ Matrix6d scaled_jacobian(const PlatformGeometry& geometry, const Rigid3& B_from_
   return j;
 }
 
+HomeSingularity::HomeSingularity(const PlatformGeometry& geometry, double length_mm) {
+  const Matrix6d j = scaled_jacobian(geometry, geometry.home_B_from_P(), length_mm);
+  determinant = j.determinant();
+  sigma_min = j.jacobiSvd().singularValues()[5];
+}
+
 SingularityMeasures singularity_measures(const PlatformGeometry& geometry, const Rigid3& B_from_P,
                                          const SingularityOptions& options) {
   options.validate();
+  return singularity_measures(geometry, HomeSingularity(geometry, length_used_mm(geometry, options)),
+                              B_from_P, options);
+}
+
+SingularityMeasures singularity_measures(const PlatformGeometry& geometry, const HomeSingularity& home,
+                                         const Rigid3& B_from_P, const SingularityOptions& options) {
   SingularityMeasures m;
-  m.characteristic_length_mm = options.characteristic_length_mm > 0 ? options.characteristic_length_mm
-                                                                    : characteristic_length_mm(geometry);
+  m.characteristic_length_mm = length_used_mm(geometry, options);
   const double length_mm = m.characteristic_length_mm;
   const Matrix6d j = scaled_jacobian(geometry, B_from_P, length_mm);
-  const Matrix6d home_j = scaled_jacobian(geometry, geometry.home_B_from_P(), length_mm);
   const Eigen::JacobiSVD<Matrix6d> svd(j, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Vector6d sigma = svd.singularValues();
   constexpr double kFar = std::numeric_limits<double>::infinity();
@@ -82,10 +97,9 @@ SingularityMeasures singularity_measures(const PlatformGeometry& geometry, const
   const double by_rad = gradient.tail<3>().norm() * length_mm;
   m.distance_mm = by_mm > 0 ? sigma[5] / by_mm : kFar;
   m.distance_deg = by_rad > 0 ? sigma[5] / by_rad * kDegPerRad : kFar;
-  m.same_side_as_home = m.determinant * home_j.determinant() > 0;
-  const double home_sigma = home_j.jacobiSvd().singularValues()[5];
+  m.same_side_as_home = m.determinant * home.determinant > 0;
   m.near_singular = m.distance_mm < options.near_mm || m.distance_deg < options.near_deg ||
-                    m.sigma_min * options.near_gain < home_sigma;
+                    m.sigma_min * options.near_gain < home.sigma_min;
   return m;
 }
 

@@ -32,8 +32,22 @@ struct SingularityMeasures {
   bool near_singular = false;
 };
 
+/// What poses are compared with: their home.
+struct HomeSingularity {
+  HomeSingularity(const PlatformGeometry& geometry, double characteristic_length_mm);
+
+  double determinant = 0;
+  double sigma_min = 0;
+};
+
 [[nodiscard]] SingularityMeasures singularity_measures(const PlatformGeometry& geometry,
                                                        const Rigid3& B_from_P,
+                                                       const SingularityOptions& options = {});
+
+/// The same with what does not depend on the pose worked out before; `home` must belong to the options'
+/// length.
+[[nodiscard]] SingularityMeasures singularity_measures(const PlatformGeometry& geometry,
+                                                       const HomeSingularity& home, const Rigid3& B_from_P,
                                                        const SingularityOptions& options = {});
 
 /// leg_jacobian at the centroid of the platform joints, rotations divided by the length: no unit.

@@ -40,6 +40,7 @@ inline PlatformGeometry nategh_agheli_hexapod() {
     g.actuators[i] = {604.8652, 1, 604.8652, 1100};
   }
   g.B_from_UG = Rigid3::from_translation({0, 0, 800});
+  g.joint_limits = JointLimits{45 * kRadPerDeg, 45 * kRadPerDeg};  // not published
   return g;
 }
 
@@ -58,6 +59,7 @@ inline PlatformGeometry jugglebot_hexapod() {
     const double length = home_mm[static_cast<Eigen::Index>(i)];
     g.actuators[i] = {length, 1, length - 1, length + 280};
   }
+  g.joint_limits = JointLimits{45 * kRadPerDeg, 45 * kRadPerDeg};  // not published
   return g;
 }
 
