@@ -9,8 +9,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-ObservationSet example_set() {
-  ObservationSet set{"tag36h11", "abc", {}};
+DetectionSet example_set() {
+  DetectionSet set{"tag36h11", "abc", {}};
   PhotographObservations photograph;
   photograph.name = "home, \"first\".jpg";
   photograph.sha256 = "0123";
@@ -39,7 +39,7 @@ ObservationSet example_set() {
 
 TEST(ObservationsFile, ReadingGivesBackEveryBit) {
   const std::string text = observations_text(example_set(), "# made by a test\n");
-  const ObservationSet set = parse_observations(text, "observations.txt");
+  const DetectionSet set = parse_observations(text, "observations.txt");
   EXPECT_EQ(observations_text(set, "# made by a test\n"), text);
   ASSERT_EQ(set.photographs.size(), 2U);
   EXPECT_EQ(set.photographs[0].name, "home, \"first\".jpg");

@@ -261,7 +261,7 @@ MarkerObservation marker_from(Record& record) {
 
 }  // namespace
 
-std::string observations_text(const ObservationSet& set, std::string_view provenance) {
+std::string observations_text(const DetectionSet& set, std::string_view provenance) {
   std::string text(provenance);
   text += kLegend;
   append_record(text, "observations", kVersion, set.family, set.camera_sha256);
@@ -273,7 +273,7 @@ std::string observations_text(const ObservationSet& set, std::string_view proven
   return text;
 }
 
-ObservationSet parse_observations(std::string_view text, const std::filesystem::path& path) {
+DetectionSet parse_observations(std::string_view text, const std::filesystem::path& path) {
   RecordReader reader(text, path);
   std::optional<Record> record = reader.next();
   if (!record || record->kind() != "observations") {
@@ -284,7 +284,7 @@ ObservationSet parse_observations(std::string_view text, const std::filesystem::
   int version = 0;
   record->take(version);
   if (version != kVersion) record->fail(fmt::format("found version {}, wanted {}", version, kVersion));
-  ObservationSet set;
+  DetectionSet set;
   record->take(set.family);
   record->take(set.camera_sha256);
   while ((record = reader.next())) {
@@ -300,7 +300,7 @@ ObservationSet parse_observations(std::string_view text, const std::filesystem::
   return set;
 }
 
-ObservationSet read_observations(const std::filesystem::path& path) {
+DetectionSet read_observations(const std::filesystem::path& path) {
   return parse_observations(read_file(path), path);
 }
 

@@ -11,7 +11,7 @@ namespace hexcal {
 
 /// What `hexcal detect` writes and `hexcal measure --observations` takes; with one photograph, also an entry
 /// of the cache.
-struct ObservationSet {
+struct DetectionSet {
   std::string family;         ///< name of the marker family
   std::string camera_sha256;  ///< of the camera file whose lens stood in the model; empty without one
   std::vector<PhotographObservations> photographs;
@@ -20,10 +20,10 @@ struct ObservationSet {
 /// The set as text: a legend, then one `photograph` record per file, also where nothing was found, each
 /// followed by its `marker` records. Numbers are printed so that reading gives back the same bits.
 /// `provenance` is the first line(s), comments, may be empty.
-[[nodiscard]] std::string observations_text(const ObservationSet& set, std::string_view provenance = {});
+[[nodiscard]] std::string observations_text(const DetectionSet& set, std::string_view provenance = {});
 
 /// Reads such a file. Throws InputError naming file, line and what was wanted.
-[[nodiscard]] ObservationSet read_observations(const std::filesystem::path& path);
-[[nodiscard]] ObservationSet parse_observations(std::string_view text, const std::filesystem::path& path);
+[[nodiscard]] DetectionSet read_observations(const std::filesystem::path& path);
+[[nodiscard]] DetectionSet parse_observations(std::string_view text, const std::filesystem::path& path);
 
 }  // namespace hexcal
