@@ -98,7 +98,8 @@ bool correct(const Way& way, double s, double largest_contraction, ComplexPose& 
     const ComplexPose step = system.jacobian.partialPivLu().solve(system.value);
     const double size = step.norm() / z.norm();
     if (!(size < 0.1)) return false;
-    if (i > 0 && size > 1e-13 && size > largest_contraction * last) return size < 1e-11;
+    if (i > 0 && size > 1e-13 && size > largest_contraction * last)
+      return size < 1e-8;  // rounding is all that is left
     z -= step;
     if (size < 1e-13 || (i > 0 && size * size / last < 1e-14)) return true;
     last = size;
@@ -200,8 +201,9 @@ PathResult follow(const Way& way, const ComplexPose& start, double largest_contr
     step = h / 2;
     if (step < kSmallestStep) break;
   }
-  // At the very end of the way and growing: on its way to infinity, where the target has no pose.
-  if (1 - s < 1e-4 && result.pose.norm() > 1e3) result.end = PathEnd::infinity;
+  // Near the end of the way and far out: on its way to infinity, where the target has no pose. (A real pose
+  // is never farther out than the legs are long, which is the unit.)
+  if (1 - s < 0.05 && result.pose.norm() > 1e3) result.end = PathEnd::infinity;
   return result;
 }
 
