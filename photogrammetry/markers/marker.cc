@@ -152,6 +152,8 @@ const char* marker_status_name(MarkerStatus status) {
       return "misfit";
     case MarkerStatus::inverted:
       return "inverted";
+    case MarkerStatus::duplicate:
+      return "duplicate";
     case MarkerStatus::not_refined:
       return "not_refined";
   }

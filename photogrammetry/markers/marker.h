@@ -39,6 +39,7 @@ enum class MarkerStatus {
   occluded,     ///< too little of the pattern is visible
   misfit,       ///< the photometric model does not explain the pixels (chi^2)
   inverted,     ///< read only as a negative: black and white are swapped
+  duplicate,    ///< the same id was read twice in the photograph
   not_refined,  ///< the refinement did not converge
 };
 

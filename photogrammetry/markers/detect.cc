@@ -1,0 +1,223 @@
+#include "photogrammetry/markers/detect.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "kinematics/geometry/input_error.h"
+#include "photogrammetry/markers/marker_decoder.h"
+#include "photogrammetry/markers/marker_verdict.h"
+#include "photogrammetry/markers/quad_finder.h"
+
+namespace hexcal {
+namespace {
+
+constexpr double kFrameMarginPx = 2;
+constexpr double kMaxNoiseFactor = 6;  // JPEG's errors at edges over the noise of flat areas; more is misfit
+constexpr double kSharedSidePx = 40;   // smaller markers tell little of the tone curve and the lens
+using Shared = Eigen::Matrix<double, kNumShared, 1>;
+
+// For finding and reading only: 16 bits become 8, linear light through a square root.
+cv::Mat eight_bit(const cv::Mat& grey, ToneCurve tone) {
+  if (grey.depth() == CV_8U) return grey;
+  std::vector<std::uint8_t> table(65536);
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const double share = static_cast<double>(i) / 65535;
+    table[i] =
+        static_cast<std::uint8_t>(std::lround(255 * (tone == ToneCurve::linear ? std::sqrt(share) : share)));
+  }
+  cv::Mat result(grey.rows, grey.cols, CV_8UC1);
+  for (int y = 0; y < grey.rows; ++y) {
+    const std::uint16_t* from = grey.ptr<std::uint16_t>(y);
+    std::uint8_t* to = result.ptr(y);
+    for (int x = 0; x < grey.cols; ++x) to[x] = table[from[x]];
+  }
+  return result;
+}
+
+Eigen::Vector2d middle_of(const DecodedMarker& marker) {
+  return 0.25 * (marker.corners_px[0] + marker.corners_px[1] + marker.corners_px[2] + marker.corners_px[3]);
+}
+
+double side_of(const DecodedMarker& marker) {
+  return 0.5 *
+         ((marker.corners_px[2] - marker.corners_px[0]).norm() +
+          (marker.corners_px[3] - marker.corners_px[1]).norm()) /
+         std::sqrt(2.0);
+}
+
+// Better read first.
+bool is_clearer(const DecodedMarker& a, const DecodedMarker& b) {
+  const auto rank = [](const DecodedMarker& m) {
+    return m.wrong_cells + (m.mirrored ? 1 : 0) - 2 * m.clarity;
+  };
+  return rank(a) < rank(b);
+}
+
+// One reading per place: of overlapping ones the clearest.
+std::vector<DecodedMarker> without_overlaps(std::vector<DecodedMarker> markers) {
+  std::stable_sort(markers.begin(), markers.end(), is_clearer);
+  std::vector<DecodedMarker> kept;
+  for (const auto& marker : markers) {
+    const bool overlaps = std::any_of(kept.begin(), kept.end(), [&](const DecodedMarker& other) {
+      return (middle_of(marker) - middle_of(other)).norm() < 0.5 * std::max(side_of(marker), side_of(other));
+    });
+    if (!overlaps) kept.push_back(marker);
+  }
+  std::stable_sort(kept.begin(), kept.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
+  return kept;
+}
+
+std::vector<DecodedMarker> read_markers(const cv::Mat& grey, const MarkerFamily& family,
+                                        const DetectionOptions& options) {
+  const MarkerDecoder decoder(family, options.ids);
+  const std::vector<Quad> quads = find_quads(grey, options.refine.min_side_px);
+  std::vector<std::optional<DecodedMarker>> read(quads.size());
+  tbb::parallel_for(std::size_t{0}, quads.size(),
+                    [&](std::size_t i) { read[i] = decoder.decode(grey, quads[i]); });
+  std::vector<DecodedMarker> markers;
+  for (auto& marker : read) {
+    if (marker) markers.push_back(*marker);
+  }
+  return without_overlaps(std::move(markers));
+}
+
+bool touches_frame(const DecodedMarker& marker, const cv::Mat& grey) {
+  return std::any_of(marker.corners_px.begin(), marker.corners_px.end(), [&grey](const Eigen::Vector2d& c) {
+    return c.x() < kFrameMarginPx || c.y() < kFrameMarginPx || c.x() > grey.cols - 1 - kFrameMarginPx ||
+           c.y() > grey.rows - 1 - kFrameMarginPx;
+  });
+}
+
+// Statuses that are known before any fit.
+MarkerStatus status_as_read(const DecodedMarker& marker, const cv::Mat& grey) {
+  if (marker.mirrored) return MarkerStatus::mirrored;
+  if (marker.inverted) return MarkerStatus::inverted;
+  if (touches_frame(marker, grey)) return MarkerStatus::cut_by_frame;
+  return MarkerStatus::ok;
+}
+
+MarkerObservation observation_as_read(const DecodedMarker& marker, MarkerStatus status) {
+  MarkerObservation observation;
+  observation.id = marker.id;
+  observation.status = status;
+  observation.corners_px = marker.corners_px;
+  observation.side_px = side_of(marker);
+  return observation;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// All markers' evidence about the tone curve and the lens stand-in together (their fits' Schur complements).
+Shared pool(const std::vector<PhotometricFit>& fits) {
+  Eigen::Matrix<double, kNumShared, kNumShared> information;
+  information.setZero();
+  information.diagonal() << 4, 4, 10, 10;  // weak: 0.5 and 0.3
+  Shared rhs = Shared::Zero();
+  std::vector<double> quality;
+  for (const auto& fit : fits) {
+    if (fit.converged) quality.push_back(fit.chi2_per_dof);
+  }
+  if (quality.empty()) return rhs;
+  const double limit = 3 * median(quality);
+  for (const auto& fit : fits) {
+    if (!fit.converged || fit.chi2_per_dof > limit || fit.saturated > 0.02 || fit.visible < 0.8) continue;
+    const auto weighted = fit.shared_information / std::max(fit.chi2_per_dof, 0.1);
+    information += weighted;
+    rhs += weighted * fit.shared;
+  }
+  return information.ldlt().solve(rhs);
+}
+
+}  // namespace
+
+void DetectionOptions::validate() const {
+  refine.validate();
+  for (const int id : ids) {
+    if (id < 0) throw InputError(fmt::format("ids has {}, wanted none below 0", id));
+  }
+}
+
+std::vector<MarkerObservation> detect_markers(const cv::Mat& grey, ToneCurve tone, const MarkerFamily& family,
+                                              const DetectionOptions& options, const CameraModel* camera) {
+  options.validate();
+  CV_Assert(grey.type() == CV_8UC1 || grey.type() == CV_16UC1);
+  const std::vector<DecodedMarker> markers = read_markers(eight_bit(grey, tone), family, options);
+  std::vector<MarkerObservation> observations;
+  std::vector<std::size_t> measured;
+  for (std::size_t i = 0; i < markers.size(); ++i) {
+    observations.push_back(observation_as_read(markers[i], status_as_read(markers[i], grey)));
+    if (observations.back().status == MarkerStatus::ok) measured.push_back(i);
+  }
+  if (measured.empty()) return observations;
+
+  PhotographModel photograph{camera != nullptr ? PixelMap(*camera) : PixelMap(grey.cols, grey.rows, {}),
+                             ToneResponse(tone), estimate_noise(grey, {0, 0, grey.cols, grey.rows})};
+  std::vector<PhotometricFit> fits(measured.size());
+  const auto fit_all = [&](bool shared_free) {
+    tbb::parallel_for(std::size_t{0}, measured.size(), [&](std::size_t k) {
+      const DecodedMarker& marker = markers[measured[k]];
+      const bool free = shared_free && side_of(marker) >= kSharedSidePx;
+      fits[k] = fit_marker(grey, photograph, family.patterns[static_cast<std::size_t>(marker.id)],
+                           fits[k].converged ? fits[k].corners_px : marker.corners_px,
+                           free && tone == ToneCurve::srgb, free && camera == nullptr);
+    });
+  };
+  fit_all(true);
+  if (tone == ToneCurve::srgb || camera == nullptr) {
+    const Shared shared = pool(fits);
+    if (tone == ToneCurve::srgb) photograph.tone = ToneResponse(tone, shared[0], shared[1]);
+    if (camera == nullptr) photograph.map = PixelMap(grey.cols, grey.rows, LensStandIn{shared[2], shared[3]});
+    fit_all(false);
+  }
+
+  std::vector<double> quality;
+  for (const auto& fit : fits) {
+    if (fit.converged) quality.push_back(fit.chi2_per_dof);
+  }
+  const double noise_factor = quality.size() < 4 ? 1 : std::clamp(median(quality), 1.0, kMaxNoiseFactor);
+  for (std::size_t k = 0; k < measured.size(); ++k) {
+    const MarkerObservation before = observations[measured[k]];
+    MarkerObservation& observation = observations[measured[k]];
+    observation = observation_from(fits[k], grey, camera, noise_factor, options.refine);
+    observation.id = before.id;
+    if (!fits[k].converged) {
+      observation.corners_px = before.corners_px;
+      observation.side_px = before.side_px;
+    }
+  }
+  for (std::size_t i = 0; i + 1 < observations.size(); ++i) {
+    if (observations[i].id != observations[i + 1].id) continue;
+    observations[i].status = observations[i + 1].status = MarkerStatus::duplicate;
+  }
+  return observations;
+}
+
+PhotographObservations observe_photograph(const Photograph& photograph, const MarkerFamily& family,
+                                          const DetectionOptions& options, const CameraModel* camera) {
+  PhotographObservations observations;
+  observations.name = photograph.path.filename().string();
+  observations.sha256 = photograph.sha256;
+  observations.status = photograph.status;
+  observations.reason = photograph.reason;
+  observations.info = photograph.info;
+  if (photograph.status != PhotographStatus::ok) return observations;
+  if (camera != nullptr &&
+      (camera->width_px != photograph.grey.cols || camera->height_px != photograph.grey.rows)) {
+    throw InputError(fmt::format("{}: is {} x {} pixels, the camera file is for {} x {}",
+                                 photograph.path.string(), photograph.grey.cols, photograph.grey.rows,
+                                 camera->width_px, camera->height_px));
+  }
+  observations.markers = detect_markers(photograph.grey, photograph.tone, family, options, camera);
+  return observations;
+}
+
+}  // namespace hexcal

@@ -1,0 +1,112 @@
+#include "photogrammetry/markers/image_noise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+namespace hexcal {
+namespace {
+
+constexpr int kWindow = 8;
+constexpr int kMaxWindowsPerAxis = 72;
+constexpr std::size_t kMinWindows = 8;
+constexpr double kQuantile = 0.25;
+constexpr double kQuantileOfUnitVariance = 0.87;  // of chi^2 over 61 degrees of freedom
+constexpr double kMaxRatio = 6;                   // between levels: more is texture
+
+struct WindowNoise {
+  double mean, variance;
+  bool clipped;
+};
+
+template <typename Pixel>
+WindowNoise window_noise(const cv::Mat& grey, int x0, int y0) {
+  constexpr double kMiddle = 0.5 * (kWindow - 1);
+  constexpr int kCount = kWindow * kWindow;
+  double sum = 0;
+  double squares = 0;
+  double along_x = 0;
+  double along_y = 0;
+  bool clipped = false;
+  for (int y = 0; y < kWindow; ++y) {
+    const Pixel* row = grey.ptr<Pixel>(y0 + y) + x0;
+    for (int x = 0; x < kWindow; ++x) {
+      const double value = row[x];
+      clipped = clipped || row[x] == 0 || row[x] == std::numeric_limits<Pixel>::max();
+      sum += value;
+      squares += value * value;
+      along_x += value * (x - kMiddle);
+      along_y += value * (y - kMiddle);
+    }
+  }
+  constexpr double kMoment = kWindow * (kWindow * (kWindow * kWindow - 1) / 12.0);
+  const double rest = squares - sum * sum / kCount - (along_x * along_x + along_y * along_y) / kMoment;
+  return {sum / kCount, std::max(rest, 0.0) / (kCount - 3), clipped};
+}
+
+}  // namespace
+
+double full_scale(const cv::Mat& grey) { return grey.depth() == CV_16U ? 65535.0 : 255.0; }
+
+double NoiseModel::variance(double encoded) const {
+  const double at = std::clamp(encoded, 0.0, 1.0) * (kLevels - 1);
+  const auto i = std::min(static_cast<std::size_t>(at), static_cast<std::size_t>(kLevels - 2));
+  const double share = at - static_cast<double>(i);
+  return at_level_[i] + share * (at_level_[i + 1] - at_level_[i]);
+}
+
+NoiseModel NoiseModel::scaled(double factor) const {
+  NoiseModel model = *this;
+  for (double& v : model.at_level_) v *= factor;
+  return model;
+}
+
+NoiseModel estimate_noise(const cv::Mat& grey, const cv::Rect& region) {
+  const cv::Rect box = region & cv::Rect(0, 0, grey.cols, grey.rows);
+  const double scale = full_scale(grey);
+  const double rounding = 1 / (12 * scale * scale);
+  std::array<std::vector<double>, NoiseModel::kLevels> by_level;
+  const auto stride_of = [](int length) { return std::max(length / kMaxWindowsPerAxis, kWindow / 2); };
+  for (int y = box.y; y + kWindow <= box.y + box.height; y += stride_of(box.height)) {
+    for (int x = box.x; x + kWindow <= box.x + box.width; x += stride_of(box.width)) {
+      const WindowNoise window = grey.depth() == CV_16U ? window_noise<std::uint16_t>(grey, x, y)
+                                                        : window_noise<std::uint8_t>(grey, x, y);
+      if (window.clipped) continue;
+      const double level = window.mean / scale * (NoiseModel::kLevels - 1);
+      by_level[static_cast<std::size_t>(level + 0.5)].push_back(window.variance / (scale * scale));
+    }
+  }
+  NoiseModel model;
+  double quietest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < by_level.size(); ++i) {
+    auto& variances = by_level[i];
+    model.at_level_[i] = -1;
+    if (variances.size() < kMinWindows) continue;
+    const auto nth =
+        variances.begin() + static_cast<std::ptrdiff_t>(kQuantile * static_cast<double>(variances.size()));
+    std::nth_element(variances.begin(), nth, variances.end());
+    model.at_level_[i] = std::max(*nth / kQuantileOfUnitVariance, rounding);
+    quietest = std::min(quietest, model.at_level_[i]);
+  }
+  if (!std::isfinite(quietest)) quietest = std::max(1.0 / (255.0 * 255.0), rounding);
+  for (double& v : model.at_level_) v = std::min(v, kMaxRatio * quietest);
+  // Levels that do not occur take the nearest that does.
+  for (std::size_t i = 0; i < by_level.size(); ++i) {
+    if (model.at_level_[i] > 0) continue;
+    double nearest = quietest;
+    for (std::size_t distance = 1; distance < by_level.size(); ++distance) {
+      const bool below = i >= distance && !by_level[i - distance].empty() &&
+                         model.at_level_[i - distance] > 0 && by_level[i - distance].size() >= kMinWindows;
+      const bool above = i + distance < by_level.size() && by_level[i + distance].size() >= kMinWindows;
+      if (below || above) {
+        nearest = model.at_level_[below ? i - distance : i + distance];
+        break;
+      }
+    }
+    model.at_level_[i] = nearest;
+  }
+  return model;
+}
+
+}  // namespace hexcal

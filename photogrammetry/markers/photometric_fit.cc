@@ -1,0 +1,544 @@
+#include "photogrammetry/markers/photometric_fit.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+#include "photogrammetry/markers/fit_pixels.h"
+
+namespace hexcal {
+namespace {
+
+// Order of the parameters.
+constexpr int kHomography = 0;  // 8
+constexpr int kBlur = 8;  // mean variance of the point spread, half the difference x - y, covariance, px^2
+constexpr int kBlack = 11, kWhite = 12;
+constexpr int kLight = 13;   // gradient x, y; then xx, xy, yy, per half side of the square
+constexpr int kShared = 18;  // tone first, second; lens k1, k2
+constexpr int kCount = 22;
+using Vector = Eigen::Matrix<double, kCount, 1>;
+using Matrix = Eigen::Matrix<double, kCount, kCount>;
+
+constexpr double kPixelVariance = 1.0 / 12;  // of the square a pixel integrates over
+constexpr double kMinBlur = 0.02;            // px^2
+constexpr double kHuber = 3.0;
+constexpr int kCoarsePixels = 2500;
+constexpr int kFinePixels = 24000;
+constexpr double kLargeSide = 300;  // px; from here on the illumination's curvature counts
+constexpr double kSmallSide = 40;   // px; from here on the blur's anisotropy can be told from the geometry
+
+// Standard deviations of what is expected before the first look; an absent one is 0.
+Vector prior_sigmas() {
+  Vector sigma = Vector::Zero();
+  sigma.segment<3>(kBlur) << 3, 0.2, 0.2;
+  sigma.segment<5>(kLight) << 0.3, 0.3, 0.1, 0.1, 0.1;
+  sigma.segment<kNumShared>(kShared) << 0.5, 0.5, 0.3, 0.3;
+  return sigma;
+}
+
+class MarkerFit {
+ public:
+  MarkerFit(const cv::Mat& grey, const PhotographModel& photograph, const FitRequest& request)
+      : grey_(grey), photograph_(photograph), request_(request) {}
+
+  PhotometricFit run() {
+    PhotometricFit fit;
+    if (!prepare()) return fit;
+    activate({kHomography, 8}, true);
+    activate({kBlur, 1}, true);
+    activate({kBlack, 2}, true);
+    activate({kLight, 2}, true);
+    select(3.6 * std::sqrt(parameters_[kBlur] + kPixelVariance) + 1.5, kCoarsePixels);
+    if (!set_levels() || !solve(12, 3e-3)) return fit;
+    const double side_px = 2 * frame_.half_side;
+    activate({kBlur + 1, 2}, side_px >= kSmallSide);
+    activate({kLight + 2, 3}, side_px >= kLargeSide);
+    activate({kShared, 2}, request_.free_tone);
+    activate({kShared + 2, 2}, request_.free_lens);
+    select(3.6 * std::sqrt(parameters_[kBlur] + kPixelVariance) + 0.5, kFinePixels);
+    if (!solve(3, 1e-3)) return fit;
+    if (request_.pattern.cells() > 2) drop_covered_cells();
+    if (!solve(6, 1e-4)) return fit;
+    finish(fit);
+    return fit;
+  }
+
+ private:
+  struct Range {
+    int first, count;
+  };
+  void activate(Range range, bool on) {
+    for (int i = range.first; i < range.first + range.count; ++i) active_[static_cast<std::size_t>(i)] = on;
+  }
+
+  bool prepare() {
+    std::array<Eigen::Vector2d, 4> ideal;
+    Eigen::Vector2d low = request_.corners_px[0];
+    Eigen::Vector2d high = low;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const auto point = photograph_.map.ideal_from_pixel(request_.corners_px[i]);
+      if (!point) return false;
+      ideal[i] = *point;
+      low = low.cwiseMin(request_.corners_px[i]);
+      high = high.cwiseMax(request_.corners_px[i]);
+    }
+    frame_.middle = 0.25 * (ideal[0] + ideal[1] + ideal[2] + ideal[3]);
+    double around = 0;
+    for (std::size_t i = 0; i < 4; ++i) around += (ideal[(i + 1) % 4] - ideal[i]).norm();
+    frame_.half_side = around / 8;
+    frame_.middle_px = 0.5 * (low + high);
+    std::array<Eigen::Vector2d, 4> corners;
+    for (std::size_t i = 0; i < 4; ++i) corners[i] = (ideal[i] - frame_.middle) / frame_.half_side;
+    const auto g = homography_from_corners(corners);
+    if (!g) return false;
+    parameters_.setZero();
+    parameters_.segment<8>(kHomography) = *g;
+    parameters_[kBlur] = 0.5;
+    parameters_[kShared] = photograph_.tone.first();
+    parameters_[kShared + 1] = photograph_.tone.second();
+    start_ = parameters_;
+
+    // The square, its surroundings as far as the pattern reaches, and the blur.
+    const double beyond = std::max(request_.pattern.cells() / request_.square_cells - 1, 0.0) * 0.5 *
+                          (high - low).maxCoeff() * 1.5;
+    const double margin = beyond + 12;
+    const cv::Rect wanted(static_cast<int>(std::floor(low.x() - margin)),
+                          static_cast<int>(std::floor(low.y() - margin)),
+                          static_cast<int>(std::ceil(high.x() - low.x() + 2 * margin)),
+                          static_cast<int>(std::ceil(high.y() - low.y() + 2 * margin)));
+    box_ = wanted & cv::Rect(0, 0, grey_.cols, grey_.rows);
+    if (box_.width < 4 || box_.height < 4) return false;
+    patch_ = PixelMapPatch::fit(photograph_.map, box_);
+    return patch_.has_value();
+  }
+
+  void select(double reach_px, int max_pixels) {
+    const PixelSelection selection{parameters_.segment<8>(kHomography), frame_, reach_px, max_pixels};
+    selected_ = select_pixels(grey_, photograph_, *patch_, request_, box_, selection);
+  }
+
+  // Black and white by linear least squares in linear light.
+  bool set_levels() {
+    Eigen::Matrix2d n = Eigen::Matrix2d::Zero();
+    Eigen::Vector2d rhs = Eigen::Vector2d::Zero();
+    for (const FitPixel& pixel : selected_.pixels) {
+      const double share = evaluate(pixel, nullptr, true).value;
+      const Eigen::Vector2d row(1 - share, share);
+      n += row * row.transpose();
+      rhs += row * photograph_.tone.decode(pixel.value);
+    }
+    if (selected_.pixels.size() < 20 || n.determinant() < 1e-6) return false;
+    parameters_.segment<2>(kBlack) = n.inverse() * rhs;
+    for (FitPixel& pixel : selected_.pixels) {
+      pixel.weight = 1 / std::sqrt(photograph_.noise.variance(pixel.value));
+    }
+    return parameters_[kWhite] > parameters_[kBlack];
+  }
+
+  struct Value {
+    double value;
+  };
+
+  // The model's encoded value at a pixel (or the white share alone) and, if asked, its derivatives.
+  Value evaluate(const FitPixel& pixel, Vector* row, bool share_only = false) const {
+    const Vector& p = parameters_;
+    Eigen::Vector2d point = pixel.point;
+    if (request_.free_lens) {
+      point += pixel.by_lens * (p.segment<2>(kShared + 2) - start_.segment<2>(kShared + 2));
+    }
+    const InverseHomography g = p.segment<8>(kHomography);
+    const SquarePoint square = square_point(g, point);
+    const double half_square = 0.5 * request_.square_cells;
+    const double middle = 0.5 * request_.pattern.cells();
+    const Eigen::Matrix2d cells_by_px = half_square * square.by_point * pixel.by_px;
+    const double a = cells_by_px(0, 0);
+    const double b = cells_by_px(0, 1);
+    const double c = cells_by_px(1, 0);
+    const double d = cells_by_px(1, 1);
+    const double xx = p[kBlur] + p[kBlur + 1] + kPixelVariance;
+    const double xy = p[kBlur + 2];
+    const double yy = p[kBlur] - p[kBlur + 1] + kPixelVariance;
+    const Symmetric2 spread{a * a * xx + 2 * a * b * xy + b * b * yy,
+                            a * c * xx + (a * d + b * c) * xy + b * d * yy,
+                            c * c * xx + 2 * c * d * xy + d * d * yy};
+    const PatternSample s = request_.pattern.sample(half_square * square.t.x() + middle,
+                                                    half_square * square.t.y() + middle, spread);
+    if (share_only) return {s.value};
+
+    const double ox = pixel.offset.x();
+    const double oy = pixel.offset.y();
+    const double shade = 1 + p[kLight] * ox + p[kLight + 1] * oy + p[kLight + 2] * ox * ox +
+                         p[kLight + 3] * ox * oy + p[kLight + 4] * oy * oy;
+    const double unshaded = p[kBlack] + (p[kWhite] - p[kBlack]) * s.value;
+    const ToneResponse tone(photograph_.tone.nominal(), p[kShared], p[kShared + 1]);
+    const ToneResponse::Encoded encoded = tone.encode(unshaded * shade);
+    if (row != nullptr) {
+      Vector& r = *row;
+      const double by_share = encoded.by_light * shade * (p[kWhite] - p[kBlack]);
+      const double tx = by_share * s.by_x * half_square * square.scale;
+      const double ty = by_share * s.by_y * half_square * square.scale;
+      r[0] = tx * point.x();
+      r[1] = tx * point.y();
+      r[2] = tx;
+      r[3] = ty * point.x();
+      r[4] = ty * point.y();
+      r[5] = ty;
+      const double along = tx * square.t.x() + ty * square.t.y();
+      r[6] = -along * point.x();
+      r[7] = -along * point.y();
+      // Heat equation, carried to pixels: half of A^T (second derivatives) A.
+      const Symmetric2& h = s.second;
+      const double hxx = a * a * h.xx + 2 * a * c * h.xy + c * c * h.yy;
+      const double hxy = a * b * h.xx + (a * d + b * c) * h.xy + c * d * h.yy;
+      const double hyy = b * b * h.xx + 2 * b * d * h.xy + d * d * h.yy;
+      r[kBlur] = by_share * 0.5 * (hxx + hyy);
+      r[kBlur + 1] = by_share * 0.5 * (hxx - hyy);
+      r[kBlur + 2] = by_share * hxy;
+      r[kBlack] = encoded.by_light * shade * (1 - s.value);
+      r[kWhite] = encoded.by_light * shade * s.value;
+      const double by_shade = encoded.by_light * unshaded;
+      r[kLight] = by_shade * ox;
+      r[kLight + 1] = by_shade * oy;
+      r[kLight + 2] = by_shade * ox * ox;
+      r[kLight + 3] = by_shade * ox * oy;
+      r[kLight + 4] = by_shade * oy * oy;
+      r[kShared] = encoded.by_first;
+      r[kShared + 1] = encoded.by_second;
+      if (request_.free_lens) {
+        const Eigen::RowVector2d by_point =
+            by_share * half_square * Eigen::RowVector2d(s.by_x, s.by_y) * square.by_point;
+        r.segment<2>(kShared + 2) = (by_point * pixel.by_lens).transpose();
+      } else {
+        r.segment<2>(kShared + 2).setZero();
+      }
+    }
+    return {encoded.value};
+  }
+
+  // Whitened residuals' median as a standard deviation, not below 1.
+  double robust_scale() const {
+    std::vector<double> sizes;
+    for (const FitPixel& pixel : selected_.pixels) {
+      if (pixel.kept) sizes.push_back(std::abs(pixel.value - evaluate(pixel, nullptr).value) * pixel.weight);
+    }
+    if (sizes.empty()) return 1;
+    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+    std::nth_element(sizes.begin(), middle, sizes.end());
+    return std::max(1.0, 1.4826 * *middle);
+  }
+
+  static double huber_cost(double r, double scale) {
+    const double z = std::abs(r) / scale;
+    return z <= kHuber ? r * r : scale * scale * kHuber * (2 * z - kHuber);
+  }
+
+  double cost(double scale) const {
+    double sum = prior_cost();
+    for (const FitPixel& pixel : selected_.pixels) {
+      if (pixel.kept) sum += huber_cost((pixel.value - evaluate(pixel, nullptr).value) * pixel.weight, scale);
+    }
+    return sum;
+  }
+
+  double prior_cost() const {
+    static const Vector sigma = prior_sigmas();
+    double sum = 0;
+    for (int i = 0; i < kCount; ++i) {
+      if (!active_[static_cast<std::size_t>(i)] || sigma[i] == 0) continue;
+      const double z = (parameters_[i] - start_[i]) / sigma[i];
+      sum += z * z;
+    }
+    return sum;
+  }
+
+  struct Normals {
+    Matrix n;
+    Vector rhs;
+    double cost;
+  };
+
+  // Normal equations of the active parameters, compressed to the first `active_list_.size()` rows.
+  Normals normals(double scale, bool with_priors) const {
+    Normals result{Matrix::Zero(), Vector::Zero(), prior_cost()};
+    const std::size_t count = active_list_.size();
+    Vector row;
+    std::array<double, kCount> j{};
+    for (const FitPixel& pixel : selected_.pixels) {
+      if (!pixel.kept) continue;
+      const double residual = (pixel.value - evaluate(pixel, &row).value) * pixel.weight;
+      const double size = std::abs(residual) / scale;
+      const double robust = size <= kHuber ? 1 : kHuber / size;
+      const double weight = std::sqrt(robust) * pixel.weight;
+      for (std::size_t k = 0; k < count; ++k) j[k] = row[active_list_[k]] * weight;
+      const double r = residual * std::sqrt(robust);
+      for (std::size_t k = 0; k < count; ++k) {
+        double* const column = result.n.data() + k * kCount;
+        const double factor = j[k];
+        for (std::size_t i = 0; i <= k; ++i) column[i] += factor * j[i];
+        result.rhs[static_cast<int>(k)] += factor * r;
+      }
+      result.cost += huber_cost(residual, scale);
+    }
+    if (with_priors) add_priors(result);
+    for (std::size_t k = 0; k < count; ++k) {
+      for (std::size_t i = 0; i < k; ++i) {
+        result.n(static_cast<int>(k), static_cast<int>(i)) =
+            result.n(static_cast<int>(i), static_cast<int>(k));
+      }
+    }
+    return result;
+  }
+
+  void add_priors(Normals& normals) const {
+    static const Vector sigma = prior_sigmas();
+    for (std::size_t k = 0; k < active_list_.size(); ++k) {
+      const int i = active_list_[k];
+      if (sigma[i] == 0) continue;
+      const double information = 1 / (sigma[i] * sigma[i]);
+      normals.n(static_cast<int>(k), static_cast<int>(k)) += information;
+      normals.rhs[static_cast<int>(k)] += information * (start_[i] - parameters_[i]);
+    }
+    if (!request_.affine) return;
+    // A saddle point's edges look the same when the pattern is stretched along them: keep that stretch.
+    for (int axis = 0; axis < 2; ++axis) {
+      Eigen::Vector3d along = parameters_.segment<3>(3 * axis);
+      along.normalize();
+      const double stiff = 1e6 * std::max(normals.n.diagonal().head<6>().maxCoeff(), 1.0);
+      normals.n.block<3, 3>(3 * axis, 3 * axis).triangularView<Eigen::Upper>() +=
+          stiff * along * along.transpose();
+    }
+  }
+
+  void list_active() {
+    active_list_.clear();
+    for (int i = 0; i < kCount; ++i) {
+      if (request_.affine && (i == 6 || i == 7)) continue;
+      if (active_[static_cast<std::size_t>(i)]) active_list_.push_back(i);
+    }
+  }
+
+  void apply(const Eigen::VectorXd& step) {
+    for (std::size_t k = 0; k < active_list_.size(); ++k) {
+      parameters_[active_list_[k]] += step[static_cast<Eigen::Index>(k)];
+    }
+    parameters_[kBlur] = std::max(parameters_[kBlur], kMinBlur);
+    const double limit = 0.8 * parameters_[kBlur] + 0.5 * kPixelVariance;
+    for (int i = kBlur + 1; i < kBlur + 3; ++i) parameters_[i] = std::clamp(parameters_[i], -limit, limit);
+  }
+
+  // Levenberg-Marquardt until the square moves less than `tolerance_px`.
+  bool solve(int max_iterations, double tolerance_px) {
+    list_active();
+    set_weights();
+    const auto count = static_cast<Eigen::Index>(active_list_.size());
+    if (selected_.pixels.size() < 2 * active_list_.size()) return false;
+    double damping = 1e-6;
+    double scale = robust_scale();
+    Normals at = normals(scale, true);
+    for (int iteration = 0; iteration < max_iterations; ++iteration) {
+      const Vector before = parameters_;
+      bool better = false;
+      double moved = 0;
+      for (int attempt = 0; attempt < 6 && !better; ++attempt) {
+        Eigen::MatrixXd n = at.n.topLeftCorner(count, count);
+        n.diagonal() *= 1 + damping;
+        const Eigen::VectorXd step = n.ldlt().solve(at.rhs.head(count));
+        if (!step.allFinite()) return false;
+        apply(step);
+        moved = step.head(request_.affine ? 6 : 8).cwiseAbs().maxCoeff() * frame_.half_side;
+        better = moved < 0.1 * tolerance_px || cost(scale) <= at.cost;
+        if (!better) {
+          parameters_ = before;
+          damping = std::max(damping * 30, 1e-4);
+        }
+      }
+      if (!better) return iteration > 0;  // at the bottom as far as rounding goes
+      damping = std::max(damping * 0.1, 1e-9);
+      if (moved < tolerance_px) return plausible();
+      at = normals(scale, true);
+    }
+    return plausible();
+  }
+
+  bool plausible() const { return parameters_.allFinite() && parameters_[kWhite] > parameters_[kBlack]; }
+
+  void set_weights() {
+    for (FitPixel& pixel : selected_.pixels) {
+      pixel.weight = 1 / std::sqrt(photograph_.noise.variance(evaluate(pixel, nullptr).value));
+    }
+  }
+
+  // Drops cells whose pixels disagree with the model as a block: something covers them.
+  void drop_covered_cells() {
+    struct Cell {
+      double sum = 0;
+      int count = 0;
+    };
+    constexpr double kMaxTerm = 100;
+    constexpr double kMaxMean = 12;
+    constexpr int kMinPixels = 6;
+    std::map<int, Cell> cells;
+    const double scale = robust_scale();
+    for (const FitPixel& pixel : selected_.pixels) {
+      const double r = (pixel.value - evaluate(pixel, nullptr).value) * pixel.weight / scale;
+      Cell& cell = cells[pixel.cell];
+      cell.sum += std::min(r * r, kMaxTerm);
+      ++cell.count;
+    }
+    for (FitPixel& pixel : selected_.pixels) {
+      const Cell& cell = cells[pixel.cell];
+      pixel.kept = cell.count < kMinPixels || cell.sum < kMaxMean * cell.count;
+    }
+  }
+
+  void finish(PhotometricFit& fit) const {
+    const double scale = robust_scale();
+    const Normals at = normals(scale, false);
+    Normals with_priors = at;
+    add_priors(with_priors);
+    const auto count = static_cast<Eigen::Index>(active_list_.size());
+    Eigen::MatrixXd n = with_priors.n.topLeftCorner(count, count);
+    n.triangularView<Eigen::StrictlyLower>() = n.transpose();
+    const Eigen::LDLT<Eigen::MatrixXd> decomposition(n);
+    if (decomposition.info() != Eigen::Success || !decomposition.isPositive()) return;
+    const Eigen::MatrixXd covariance = decomposition.solve(Eigen::MatrixXd::Identity(count, count));
+
+    const int geometry = request_.affine ? 6 : 8;
+    measure_residuals(fit, scale, covariance, geometry);
+    place_corners(fit, covariance.topLeftCorner(geometry, geometry), geometry);
+    fit.blur_px = std::sqrt(parameters_[kBlur]);
+    fit.black = parameters_[kBlack];
+    fit.white = parameters_[kWhite];
+    share_information(fit, at);
+    fit.converged = fit.covariance_px2.allFinite();
+  }
+
+  // Fit quality, and the score's covariance summed by blocks (White 1980, clustered): residuals of
+  // neighbouring pixels are not independent after JPEG or where the model misfits.
+  void measure_residuals(PhotometricFit& fit, double scale, const Eigen::MatrixXd& covariance,
+                         int geometry) const {
+    std::map<int, Vector> scores;
+    double sum = 0;
+    double used = 0;
+    int agreeing = 0;
+    Vector row;
+    for (const FitPixel& pixel : selected_.pixels) {
+      const double residual = (pixel.value - evaluate(pixel, &row).value) * pixel.weight;
+      if (pixel.kept && std::abs(residual) < 5 * scale) ++agreeing;
+      if (!pixel.kept) continue;
+      const double size = std::abs(residual) / scale;
+      const double robust = size <= kHuber ? 1 : kHuber / size;
+      sum += robust * residual * residual;
+      used += 1;
+      auto [entry, is_new] = scores.try_emplace(pixel.block, Vector::Zero());
+      for (std::size_t k = 0; k < active_list_.size(); ++k) {
+        entry->second[static_cast<int>(k)] += row[active_list_[k]] * pixel.weight * residual * robust;
+      }
+    }
+    const double free = std::max(used - static_cast<double>(active_list_.size()), 1.0);
+    fit.pixels = static_cast<int>(used);
+    fit.chi2_per_dof = sum / free;
+    fit.visible = agreeing / std::max(1.0, static_cast<double>(selected_.pixels.size()));
+    fit.saturated =
+        selected_.clipped / std::max(1.0, static_cast<double>(selected_.pixels.size() +
+                                                              static_cast<std::size_t>(selected_.clipped)));
+    const auto count = static_cast<Eigen::Index>(active_list_.size());
+    const Eigen::MatrixXd geometry_rows = covariance.topRows(geometry);
+    const Eigen::MatrixXd information = covariance.topLeftCorner(geometry, geometry).inverse();
+    double clustered = 0;
+    for (const auto& [block, score] : scores) {
+      const Eigen::VectorXd shift = geometry_rows * score.head(count);
+      clustered += shift.dot(information * shift);
+    }
+    const auto blocks = static_cast<double>(scores.size());
+    const double unbiased = blocks > geometry + 1 ? blocks / (blocks - geometry) : 1;
+    fit.covariance_factor = std::max(clustered / geometry * unbiased, 1e-12);
+  }
+
+  void place_corners(PhotometricFit& fit, const Eigen::MatrixXd& covariance, int geometry) const {
+    static constexpr double kSquare[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+    const InverseHomography g = parameters_.segment<8>(kHomography);
+    Eigen::Matrix3d forward;
+    forward << g[0], g[1], g[2], g[3], g[4], g[5], g[6], g[7], 1;
+    forward = forward.inverse().eval();
+    const PixelMap map = map_after_fit();
+    const auto place = [&](double tx, double ty, Eigen::Matrix<double, 2, 8>& by_g) {
+      const Eigen::Vector2d n = (forward * Eigen::Vector3d(tx, ty, 1)).hnormalized();
+      const SquarePoint square = square_point(g, n);
+      Eigen::Matrix<double, 2, 8> t_by_g;
+      t_by_g << n.x(), n.y(), 1, 0, 0, 0, -tx * n.x(), -tx * n.y(), 0, 0, 0, n.x(), n.y(), 1, -ty * n.x(),
+          -ty * n.y();
+      t_by_g *= square.scale;
+      Eigen::Matrix2d by_ideal;
+      const Eigen::Vector2d px = map.pixel_from_ideal(frame_.middle + frame_.half_side * n, &by_ideal);
+      by_g = -by_ideal * frame_.half_side * square.by_point.inverse() * t_by_g;
+      return px;
+    };
+    Eigen::Matrix<double, 8, 8> corners_by_g;
+    for (int i = 0; i < 4; ++i) {
+      Eigen::Matrix<double, 2, 8> by_g;
+      fit.corners_px[static_cast<std::size_t>(i)] = place(kSquare[i][0], kSquare[i][1], by_g);
+      corners_by_g.middleRows<2>(2 * i) = by_g;
+    }
+    Eigen::Matrix<double, 2, 8> by_g;
+    fit.centre_px = place(0, 0, by_g);
+    fit.covariance_px2 =
+        corners_by_g.leftCols(geometry) * covariance * corners_by_g.leftCols(geometry).transpose();
+    fit.centre_covariance_px2 = by_g.leftCols(geometry) * covariance * by_g.leftCols(geometry).transpose();
+  }
+
+  PixelMap map_after_fit() const {
+    if (!request_.free_lens) return photograph_.map;
+    const LensStandIn lens = photograph_.map.stand_in();
+    return {grey_.cols, grey_.rows,
+            LensStandIn{lens.k1 + parameters_[kShared + 2], lens.k2 + parameters_[kShared + 3]}};
+  }
+
+  // Schur complement of everything but the shared parameters.
+  void share_information(PhotometricFit& fit, const Normals& at) const {
+    fit.shared_information.setZero();
+    fit.shared = parameters_.segment<kNumShared>(kShared);
+    const auto count = static_cast<Eigen::Index>(active_list_.size());
+    const auto first_shared =
+        std::count_if(active_list_.begin(), active_list_.end(), [](int i) { return i < kShared; });
+    const auto own = static_cast<Eigen::Index>(first_shared);
+    const Eigen::Index shared = count - own;
+    if (shared == 0) return;
+    Eigen::MatrixXd inner = at.n.topLeftCorner(own, own);
+    inner.diagonal().array() += 1e-9 * inner.diagonal().maxCoeff();
+    const Eigen::MatrixXd cross = at.n.block(0, own, own, shared);
+    const Eigen::MatrixXd rest =
+        at.n.block(own, own, shared, shared) - cross.transpose() * inner.ldlt().solve(cross);
+    for (Eigen::Index a = 0; a < shared; ++a) {
+      for (Eigen::Index b = 0; b < shared; ++b) {
+        fit.shared_information(active_list_[static_cast<std::size_t>(own + a)] - kShared,
+                               active_list_[static_cast<std::size_t>(own + b)] - kShared) = rest(a, b);
+      }
+    }
+  }
+
+  const cv::Mat& grey_;
+  const PhotographModel& photograph_;
+  const FitRequest& request_;
+  FitFrame frame_;
+  cv::Rect box_;
+  std::optional<PixelMapPatch> patch_;
+  FitPixels selected_;
+  Vector parameters_ = Vector::Zero();
+  Vector start_ = Vector::Zero();
+  std::array<bool, kCount> active_{};
+  std::vector<int> active_list_;
+};
+
+}  // namespace
+
+PhotometricFit fit_pattern(const cv::Mat& grey, const PhotographModel& photograph,
+                           const FitRequest& request) {
+  return MarkerFit(grey, photograph, request).run();
+}
+
+}  // namespace hexcal

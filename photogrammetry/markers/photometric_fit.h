@@ -1,0 +1,62 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <opencv2/core/mat.hpp>
+
+#include "photogrammetry/markers/blurred_pattern.h"
+#include "photogrammetry/markers/image_noise.h"
+#include "photogrammetry/markers/pixel_map.h"
+#include "photogrammetry/photograph/tone_response.h"
+
+namespace hexcal {
+
+/// What all markers of a photograph share.
+struct PhotographModel {
+  PixelMap map;
+  ToneResponse tone;
+  NoiseModel noise;
+};
+
+/// Parameters of the photograph that one marker's fit may estimate: the tone curve's two, the lens stand-in's
+/// two.
+constexpr int kNumShared = 4;
+
+struct FitRequest {
+  BlurredPattern pattern;
+  double square_cells = 0;                    ///< the measured square, centred on the pattern
+  std::array<Eigen::Vector2d, 4> corners_px;  ///< of that square, within 0.5 px or so
+  bool affine = false;                        ///< no perspective: a saddle point's small window
+  bool free_tone = false;
+  bool free_lens = false;  ///< only without a camera
+  /// Half the side of the window of a saddle point in cells; infinite for markers.
+  double window_cells = 1e9;
+};
+
+struct PhotometricFit {
+  bool converged = false;
+  std::array<Eigen::Vector2d, 4> corners_px;
+  Eigen::Matrix<double, 8, 8> covariance_px2;  ///< for the noise model as it is
+  Eigen::Vector2d centre_px;                   ///< image of the square's centre
+  Eigen::Matrix2d centre_covariance_px2;
+  double chi2_per_dof = 0;
+  double covariance_factor =
+      1;  ///< by which correlated residuals (JPEG blocks, misfit) make the covariance too small
+  double blur_px = 0;
+  double black = 0, white = 0;  ///< light, share of full scale
+  double visible = 0;           ///< share of the transitions' pixels that agree with the model
+  double saturated = 0;         ///< share of the pixels used that clip
+  int pixels = 0;
+  /// Information of this marker alone about the shared parameters, others marginalised, and its estimate of
+  /// them.
+  Eigen::Matrix<double, kNumShared, kNumShared> shared_information;
+  Eigen::Matrix<double, kNumShared, 1> shared;
+};
+
+/// Levenberg-Marquardt on the pixels around the transitions: homography, blur (symmetric 2x2), black, white,
+/// illumination gradient, and whatever of the photograph is free. Whitened by the noise model, Huber weights,
+/// cells whose pixels disagree as a block are dropped (occlusion).
+[[nodiscard]] PhotometricFit fit_pattern(const cv::Mat& grey, const PhotographModel& photograph,
+                                         const FitRequest& request);
+
+}  // namespace hexcal
