@@ -1,0 +1,137 @@
+#include <algorithm>
+#include <cmath>
+
+#include "tools/synthetic/random_source.h"
+#include "tools/synthetic/tile_renderer.h"
+
+namespace hexcal {
+namespace {
+
+constexpr int kTexels = 1024;
+
+// A periodic random texture of several octaves, mean 0, about +-1.
+const std::vector<float>& grain_texture() {
+  static const std::vector<float> texture = [] {
+    std::vector<float> sum(static_cast<std::size_t>(kTexels) * kTexels, 0.0F);
+    for (int octave = 0; octave < 8; ++octave) {
+      const int cells = 8 << octave;
+      const double weight = std::pow(0.75, octave) * 0.5;
+      const auto value = [&](int x, int y) {
+        const auto key = static_cast<std::uint64_t>(((octave * cells) + y % cells) * cells + x % cells);
+        return static_cast<double>(mixed_bits(key ^ 0xC0FFEEULL) >> 40) * 0x1.0p-23 - 1.0;
+      };
+      for (int y = 0; y < kTexels; ++y) {
+        const double fy = static_cast<double>(y) * cells / kTexels;
+        const int iy = static_cast<int>(fy);
+        for (int x = 0; x < kTexels; ++x) {
+          const double fx = static_cast<double>(x) * cells / kTexels;
+          const int ix = static_cast<int>(fx);
+          const double u = fx - ix;
+          const double v = fy - iy;
+          const double top = (1 - u) * value(ix, iy) + u * value(ix + 1, iy);
+          const double bottom = (1 - u) * value(ix, iy + 1) + u * value(ix + 1, iy + 1);
+          sum[static_cast<std::size_t>(y * kTexels + x)] +=
+              static_cast<float>(weight * ((1 - v) * top + v * bottom));
+        }
+      }
+    }
+    return sum;
+  }();
+  return texture;
+}
+
+}  // namespace
+
+VisibleSurface::VisibleSurface(const Surface& surface, const Lamp& lamp, const Rigid3& camera_from_world, int index)
+    : paint_(surface),
+      warp_(surface.warp),
+      drawn_per_printed_(surface.print_scale.cwiseInverse()),
+      grain_(surface.grain),
+      texels_per_mm_(1 / surface.grain_mm),
+      background_(surface.background),
+      index_(index) {
+  const Rigid3 camera_from_surface = camera_from_world * surface.world_from_surface;
+  const Rigid3 surface_from_camera = inverse(camera_from_surface);
+  surface_from_camera_ = surface_from_camera.rotation_matrix();
+  camera_in_surface_ = surface_from_camera.translation;
+  for (const Eigen::Vector2d& corner : surface.outline_mm) {
+    const Eigen::Vector3d p = camera_from_surface * surface.printed_point(corner);
+    if (p.z() < 1.0) {
+      everywhere_ = true;
+    } else {
+      outline_.emplace_back(p.head<2>() / p.z());
+    }
+  }
+  // A warped sheet's outline is not straight in the image.
+  everywhere_ = everywhere_ || warp_.has_value();
+  const Eigen::Vector3d normal = surface.world_from_surface.rotation * Eigen::Vector3d::UnitZ();
+  const double base = lamp.ambient + lamp.strength * std::max(0.0, normal.dot(lamp.towards.normalized()));
+  const auto slope = [&](const Eigen::Vector3d& axis) {
+    return base * lamp.gradient_per_mm.dot(surface.world_from_surface.rotation * axis);
+  };
+  const double origin = base * (1 + lamp.gradient_per_mm.dot(surface.world_from_surface.translation));
+  irradiance_ = Eigen::Vector3d(origin, slope(Eigen::Vector3d::UnitX()), slope(Eigen::Vector3d::UnitY()))
+                    .cast<float>();
+}
+
+VisibleSurface::Hit VisibleSurface::hit(double x, double y) const {
+  const Eigen::Vector3d way = surface_from_camera_ * Eigen::Vector3d(x, y, 1.0);
+  if (way.z() >= 0 || camera_in_surface_.z() <= 0) return {};  // seen from behind
+  double depth = -camera_in_surface_.z() / way.z();
+  Eigen::Vector2d p = camera_in_surface_.head<2>() + depth * way.head<2>();
+  if (warp_) {
+    for (int iteration = 0; iteration < 8; ++iteration) {
+      const double next = (warp_->z(p) - camera_in_surface_.z()) / way.z();
+      const double change = next - depth;
+      depth = next;
+      p = camera_in_surface_.head<2>() + depth * way.head<2>();
+      if (std::abs(change) < 1e-9) break;
+    }
+  }
+  return {depth, p.cwiseProduct(drawn_per_printed_)};
+}
+
+bool VisibleSurface::may_meet(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const {
+  if (camera_in_surface_.z() <= 0) return false;
+  if (everywhere_) return true;
+  // The outline is convex in the image as well: look for a side, of it or of the rectangle, that separates.
+  Eigen::Vector2d outline_low = outline_.front();
+  Eigen::Vector2d outline_high = outline_.front();
+  for (const Eigen::Vector2d& p : outline_) {
+    outline_low = outline_low.cwiseMin(p);
+    outline_high = outline_high.cwiseMax(p);
+  }
+  if ((outline_low.array() > high.array()).any() || (outline_high.array() < low.array()).any()) return false;
+  for (std::size_t i = 0; i < outline_.size(); ++i) {
+    const Eigen::Vector2d& a = outline_[i];
+    const Eigen::Vector2d way = outline_[(i + 1) % outline_.size()] - a;
+    // Image y points down, so that a surface seen from its front runs clockwise in these coordinates.
+    const Eigen::Vector2d outward(-way.y(), way.x());
+    const Eigen::Vector2d nearest(outward.x() > 0 ? low.x() : high.x(), outward.y() > 0 ? low.y() : high.y());
+    if (outward.dot(nearest - a) > 0) return false;
+  }
+  return true;
+}
+
+float VisibleSurface::irradiance(const Eigen::Vector2d& at) const {
+  return std::max(0.05F, irradiance_.x() + irradiance_.y() * static_cast<float>(at.x()) +
+                             irradiance_.z() * static_cast<float>(at.y()));
+}
+
+float VisibleSurface::grain(const Eigen::Vector2d& at) const {
+  if (grain_ <= 0) return 1;
+  const auto& texture = grain_texture();
+  const Eigen::Vector2d p = (at * texels_per_mm_).array() + 1e6;
+  const int x = static_cast<int>(p.x());
+  const int y = static_cast<int>(p.y());
+  const auto u = static_cast<float>(p.x() - x);
+  const auto v = static_cast<float>(p.y() - y);
+  const auto texel = [&](int i, int j) {
+    return texture[static_cast<std::size_t>((j & (kTexels - 1)) * kTexels + (i & (kTexels - 1)))];
+  };
+  const float top = (1 - u) * texel(x, y) + u * texel(x + 1, y);
+  const float bottom = (1 - u) * texel(x, y + 1) + u * texel(x + 1, y + 1);
+  return std::max(0.0F, 1 + grain_ * ((1 - v) * top + v * bottom));
+}
+
+}  // namespace hexcal
