@@ -5,7 +5,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "kinematics/geometry/covariance.h"
+#include "kinematics/forward.h"
 #include "kinematics/geometry/input_error.h"
 #include "tools/synthetic/random_source.h"
 
@@ -29,19 +29,6 @@ bool within_strokes(const PlatformGeometry& geometry, const LegVector& lengths_m
   return true;
 }
 
-// B_from_P with the given leg lengths: Newton on SE(3) from a start near by.
-std::optional<Rigid3> assembled(const PlatformGeometry& geometry, const LegVector& lengths_mm, Rigid3 B_from_P) {
-  for (int iteration = 0; iteration < 30; ++iteration) {
-    const LegVector residual = lengths_mm - leg_lengths(geometry, B_from_P);
-    if (residual.lpNorm<Eigen::Infinity>() < 1e-11) return B_from_P;
-    const Vector6d step = leg_jacobian(geometry, B_from_P).partialPivLu().solve(residual);
-    if (!step.allFinite() || step.head<3>().norm() > 500) return std::nullopt;
-    B_from_P = perturbed(B_from_P, step);
-  }
-  const LegVector residual = lengths_mm - leg_lengths(geometry, B_from_P);
-  return residual.lpNorm<Eigen::Infinity>() < 1e-8 ? std::optional<Rigid3>(B_from_P) : std::nullopt;
-}
-
 // Axial compression of each leg, in N, under a weight at O_P.
 LegVector leg_forces_n(const PlatformGeometry& geometry, const Rigid3& B_from_P, double payload_n) {
   Vector6d wrench = Vector6d::Zero();
@@ -60,13 +47,15 @@ std::optional<Rigid3> true_B_from_P(const VirtualMachine& machine, const LegVect
     if (way != 0) lengths[i] -= std::copysign(0.5 * errors.backlash_mm, way);
   }
   if (!within_strokes(machine.as_built, lengths)) return std::nullopt;
-  const Rigid3 start = machine.nominal.B_from_P(Pose{});
-  std::optional<Rigid3> B_from_P = assembled(machine.as_built, lengths, start);
-  if (B_from_P && errors.leg_compliance_mm_per_n > 0) {
-    const LegVector forces = leg_forces_n(machine.as_built, *B_from_P, errors.payload_n);
-    B_from_P = assembled(machine.as_built, lengths - errors.leg_compliance_mm_per_n * forces, *B_from_P);
+  ForwardResult assembled =
+      forward_kinematics(machine.as_built, lengths, machine.nominal.B_from_P(Pose{}));
+  if (assembled.status != ForwardStatus::converged) return std::nullopt;
+  if (errors.leg_compliance_mm_per_n > 0) {
+    const LegVector forces = leg_forces_n(machine.as_built, *assembled.B_from_P, errors.payload_n);
+    assembled = forward_kinematics(machine.as_built, lengths - errors.leg_compliance_mm_per_n * forces,
+                                   *assembled.B_from_P);
   }
-  return B_from_P;
+  return assembled.B_from_P;
 }
 
 Pose random_pose(RandomSource& random, double range_mm, double range_rad) {
