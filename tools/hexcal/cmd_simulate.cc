@@ -63,11 +63,10 @@ int run(const Flags& flags) {
 
   const VirtualLaboratory laboratory = make_laboratory(options);
   std::unique_ptr<ProgressBar> bar;
-  const RoundResult result =
-      write_campaign(flags.out, laboratory, round, [&bar](int done, int total) {
-        if (done == 0) bar = std::make_unique<ProgressBar>("rendering", static_cast<std::size_t>(total));
-        if (done > 0) bar->advance();
-      });
+  const RoundResult result = write_campaign(flags.out, laboratory, round, [&bar](int done, int total) {
+    if (done == 0) bar = std::make_unique<ProgressBar>("rendering", static_cast<std::size_t>(total));
+    if (done > 0) bar->advance();
+  });
   bar.reset();
   fmt::print("{}: {} photographs, truth in {}\n", flags.out.string(), result.photographs,
              (flags.out / "truth").string());
@@ -97,11 +96,15 @@ void add_simulate_command(CLI::App& app, Action& action) {
       ->check(CLI::IsMember({"profile", "brown"}))
       ->capture_default_str();
   command->add_option("--focal-mm", options.focal_mm, "18 to 105")->capture_default_str();
-  command->add_option("--distance-mm", options.distance_mm, "camera to grips at 35 mm; grows with the focal length")
+  command
+      ->add_option("--distance-mm", options.distance_mm,
+                   "camera to grips at 35 mm; grows with the focal length")
       ->capture_default_str();
   command->add_option("--range-mm", options.range_mm, "of the random poses, each way")->capture_default_str();
-  command->add_option("--range-deg", options.range_deg, "of the random poses, each way")->capture_default_str();
-  command->add_option("--family", options.markers.family, "of the markers on the grips")->capture_default_str();
+  command->add_option("--range-deg", options.range_deg, "of the random poses, each way")
+      ->capture_default_str();
+  command->add_option("--family", options.markers.family, "of the markers on the grips")
+      ->capture_default_str();
   command->add_option("--marker-mm", options.markers.size_mm, "edge of their squares")->capture_default_str();
   command->add_option("--joint-error-mm", options.machine.joint_sigma_mm, "sigma of each joint coordinate")
       ->capture_default_str();
@@ -113,13 +116,15 @@ void add_simulate_command(CLI::App& app, Action& action) {
       ->capture_default_str();
   command->add_option("--backlash-mm", options.machine.backlash_mm, "leg play (not modelled)")
       ->capture_default_str();
-  command->add_option("--compliance-mm-per-n", options.machine.leg_compliance_mm_per_n,
-                      "leg shortening under load (not modelled)")
+  command
+      ->add_option("--compliance-mm-per-n", options.machine.leg_compliance_mm_per_n,
+                   "leg shortening under load (not modelled)")
       ->capture_default_str();
   command->add_option("--sheet-scale-x", options.print.scale.x(), "print of the sheet longer by this factor")
       ->capture_default_str();
   command->add_option("--sheet-scale-y", options.print.scale.y(), "the same in y")->capture_default_str();
-  command->add_option("--sheet-warp-mm", options.print.warp_mm.x(), "height of the sheet's middle over its ends")
+  command
+      ->add_option("--sheet-warp-mm", options.print.warp_mm.x(), "height of the sheet's middle over its ends")
       ->capture_default_str();
   command->add_option("--blur-min-px", options.blur_min_px, "sigma of the sharpest photograph")
       ->capture_default_str();
@@ -129,7 +134,8 @@ void add_simulate_command(CLI::App& app, Action& action) {
   command->add_flag("--grey", options.jpeg.grey, "one-channel JPEG");
   command->add_flag("--true-camera", flags->true_camera, "also write the true camera as camera.yaml");
   command->add_flag("--no-images", flags->no_images, "everything but the photographs");
-  command->add_option("--pose-noise-um", flags->pose_noise_um, "write results/poses.csv with this noise per axis");
+  command->add_option("--pose-noise-um", flags->pose_noise_um,
+                      "write results/poses.csv with this noise per axis");
   command->add_option("--pose-noise-mdeg", flags->pose_noise_mdeg, "the same for angles, 0.001 deg");
   command->add_option("--from", flags->from, "second round: campaign whose hidden machine is moved again");
   command->add_option("--commands", flags->commands, "actuator readings to move to (actuators.csv)");

@@ -13,7 +13,10 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   hexcal::Action action;
   // In the order of a day's work.
-  for (const auto add : {hexcal::add_evaluate_command, hexcal::add_completion_command}) add(app, action);
+  for (const auto add :
+       {hexcal::add_simulate_command, hexcal::add_evaluate_command, hexcal::add_completion_command}) {
+    add(app, action);
+  }
   try {
     app.parse(argc, argv);
     return action();

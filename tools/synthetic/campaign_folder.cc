@@ -31,8 +31,8 @@ std::string campaign_text(const VirtualLaboratory& laboratory) {
       "markers:\n  family: {}\n  fixed:  {{ids: {}, size_mm: {}}}\n  moving: {{ids: {}, size_mm: {}}}\n"
       "frames:\n  UG: {{from: nominal, file: markers_nominal.csv}}\n"
       "  LG: {{from: home, pose: home, gd_mm: {}}}\nscale: {{from: markers}}\n",
-      markers.family, ids(markers.first_fixed_id), markers.size_mm, ids(markers.first_moving_id), markers.size_mm,
-      laboratory.machine.nominal.gd_mm);
+      markers.family, ids(markers.first_fixed_id), markers.size_mm, ids(markers.first_moving_id),
+      markers.size_mm, laboratory.machine.nominal.gd_mm);
 }
 
 // The fixed markers' coordinates as a coordinate measuring machine would have given them.
@@ -206,8 +206,8 @@ std::vector<PoseRecord> noisy_poses(const VirtualLaboratory& laboratory, const R
   return noisy;
 }
 
-void take_photographs(const fs::path& folder, const VirtualLaboratory& laboratory, const std::vector<Shot>& shots,
-                      const SimulationProgress& progress) {
+void take_photographs(const fs::path& folder, const VirtualLaboratory& laboratory,
+                      const std::vector<Shot>& shots, const SimulationProgress& progress) {
   if (progress) progress(0, static_cast<int>(shots.size()));
   const RayLattice lens(laboratory.camera);
   std::atomic<int> done = 0;
@@ -252,8 +252,8 @@ RoundResult write_campaign(const fs::path& folder, const VirtualLaboratory& labo
   const std::string camera = format_camera_file(head, true_camera(laboratory));
   if (options.true_camera) write("camera.yaml", camera);
   if (options.pose_noise_mm || options.pose_noise_rad) {
-    write("results/poses.csv", format_pose_table(head, noisy_poses(laboratory, options, round.true_poses),
-                                                 PoseColumns::measured));
+    write("results/poses.csv",
+          format_pose_table(head, noisy_poses(laboratory, options, round.true_poses), PoseColumns::measured));
   }
   write("truth/camera.yaml", camera);
   write("truth/poses.csv", format_pose_table(head, round.true_poses, PoseColumns::predicted));

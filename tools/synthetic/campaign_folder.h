@@ -20,7 +20,7 @@ struct RoundOptions {
   bool true_camera = false;             ///< camera.yaml beside campaign.yaml, as if calibrated without error
   std::optional<double> pose_noise_mm;  ///< writes results/poses.csv: true poses with this noise per axis
   std::optional<double> pose_noise_rad;
-  std::string head;                     ///< first comment line of every file
+  std::string head;  ///< first comment line of every file
 };
 
 struct RoundResult {
@@ -33,7 +33,8 @@ using SimulationProgress = std::function<void(int done, int total)>;
 
 /// Writes a campaign folder (campaign.yaml, hexapod.yaml, targets.csv, legs.csv, markers_nominal.csv,
 /// sheet.yaml, poses/, calibration/) with its truth in truth/.
-[[nodiscard]] RoundResult write_campaign(const std::filesystem::path& folder, const VirtualLaboratory& laboratory,
-                                         const RoundOptions& options, const SimulationProgress& progress = {});
+[[nodiscard]] RoundResult write_campaign(const std::filesystem::path& folder,
+                                         const VirtualLaboratory& laboratory, const RoundOptions& options,
+                                         const SimulationProgress& progress = {});
 
 }  // namespace hexcal

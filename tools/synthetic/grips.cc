@@ -28,7 +28,8 @@ constexpr Material kGripSteel{0.10F};
 constexpr Material kLightSteel{0.33F, {0.98F, 1.0F, 1.03F}, 0.12F, 0.4};
 constexpr Material kLegSteel{0.42F, {1.0F, 1.0F, 1.02F}, 0.15F, 0.3};
 
-Surface plain_surface(const Rigid3& pose, const std::vector<Eigen::Vector2d>& outline, const Material& material) {
+Surface plain_surface(const Rigid3& pose, const std::vector<Eigen::Vector2d>& outline,
+                      const Material& material) {
   Surface surface;
   surface.world_from_surface = pose;
   surface.outline_mm = outline;
@@ -51,8 +52,8 @@ Rigid3 side_frame(double angle, double apothem_mm, double z_mm) {
 }
 
 // A regular prism about the z axis of `pose`.
-void add_prism(std::vector<Surface>& surfaces, const Rigid3& pose, int sides, double apothem_mm, double z_low_mm,
-               double z_high_mm, const Material& material) {
+void add_prism(std::vector<Surface>& surfaces, const Rigid3& pose, int sides, double apothem_mm,
+               double z_low_mm, double z_high_mm, const Material& material) {
   const double half_width = apothem_mm * std::tan(kPi / sides);
   const double half_height = 0.5 * (z_high_mm - z_low_mm);
   std::vector<Eigen::Vector2d> cap;
@@ -85,7 +86,7 @@ void add_room(std::vector<Surface>& surfaces, RandomSource& random) {
     decal.round = kind == 0 && random.uniform(0, 1) < 0.4;
     for (int k = 0; k < decal.columns * decal.rows; ++k) {
       decal.albedo.push_back(static_cast<float>(random.uniform(0, 1) < 0.5 ? random.uniform(0.03, 0.12)
-                                                                         : random.uniform(0.2, 0.75)));
+                                                                           : random.uniform(0.2, 0.75)));
     }
     wall.decals.push_back(decal);
   }
@@ -123,7 +124,8 @@ Decal marker_decal(const std::string& family, int id, double size_mm, const Eige
   decal.top_left_mm = centre_mm + Eigen::Vector2d(-half, half);
   decal.cell_mm = {cell, cell};
   decal.columns = decal.rows = pattern.cells;
-  for (const std::uint8_t white : pattern.white) decal.albedo.push_back(white != 0 ? kPaperAlbedo : kInkAlbedo);
+  for (const std::uint8_t white : pattern.white)
+    decal.albedo.push_back(white != 0 ? kPaperAlbedo : kInkAlbedo);
   return decal;
 }
 
@@ -181,7 +183,7 @@ Scene rig_scene(const Rig& rig, const Rigid3& UG_from_LG) {
   scene.lamp.towards = {0.78, -0.25, 0.42};
   scene.lamp.ambient = 0.42;
   scene.lamp.strength = 0.62;
-  scene.lamp.gradient_per_mm = {1.5e-4, -6e-4, 4e-4};
+  scene.lamp.gradient_per_mm = {1e-4, -3.5e-4, 3e-4};
   for (const Sticker& sticker : rig.stickers) {
     scene.surfaces.push_back(sticker_surface(rig.family, sticker));
     if (sticker.moving) {

@@ -57,12 +57,13 @@ inline constexpr float kPaperAlbedo = 0.78F;
 /// What one photograph shows of one sticker.
 struct StickerView {
   std::array<Eigen::Vector2d, 4> corners_px;
-  double visible_share = 0;    ///< of a 9 x 9 grid over its square: in the frame, from the front, not hidden
-  double incidence_rad = 0;    ///< between its normal and the line of sight
-  double side_px = 0;          ///< mean side
+  double visible_share = 0;  ///< of a 9 x 9 grid over its square: in the frame, from the front, not hidden
+  double incidence_rad = 0;  ///< between its normal and the line of sight
+  double side_px = 0;        ///< mean side
 };
 
 [[nodiscard]] std::vector<StickerView> sticker_views(const Scene& scene, const std::vector<Sticker>& stickers,
-                                                     const CameraModel& camera, const Rigid3& camera_from_world);
+                                                     const CameraModel& camera,
+                                                     const Rigid3& camera_from_world);
 
 }  // namespace hexcal

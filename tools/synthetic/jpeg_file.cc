@@ -55,7 +55,8 @@ void write_jpeg(const std::filesystem::path& path, const cv::Mat& photograph, co
   Exiv2::BasicIo& io = image->io();
   io.open();
   const Exiv2::DataBuf data = io.read(static_cast<long>(io.size()));
-  write_file_atomically(path, {reinterpret_cast<const char*>(data.pData_), static_cast<std::size_t>(data.size_)});
+  write_file_atomically(path,
+                        {reinterpret_cast<const char*>(data.pData_), static_cast<std::size_t>(data.size_)});
 }
 
 std::string capture_time(int seconds) {

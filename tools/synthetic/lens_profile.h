@@ -17,9 +17,9 @@ inline constexpr int kSensorHeightPx = 4000;
 [[nodiscard]] const std::vector<double>& profile_focal_lengths_mm();
 
 /// The AF-S DX 18-105 by its public profile (lensfun, slr-nikon.xml, model ptlens) in the form that keeps the
-/// paraxial focal length: with t = tan(angle), r = t (1 + c' t + b' t^2 + a' t^3), which LensModel::radial holds
-/// exactly. The principal point is the middle of the frame. Between the profile's focal lengths the terms times
-/// focal length are interpolated linearly. Throws InputError outside 18 to 105 mm.
+/// paraxial focal length: with t = tan(angle), r = t (1 + c' t + b' t^2 + a' t^3), which LensModel::radial
+/// holds exactly. The principal point is the middle of the frame. Between the profile's focal lengths the
+/// terms times focal length are interpolated linearly. Throws InputError outside 18 to 105 mm.
 [[nodiscard]] CameraModel profile_camera(double focal_mm, int width_px);
 
 /// Brown-Conrady camera of about the same size of distortion.

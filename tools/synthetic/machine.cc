@@ -47,8 +47,7 @@ std::optional<Rigid3> true_B_from_P(const VirtualMachine& machine, const LegVect
     if (way != 0) lengths[i] -= std::copysign(0.5 * errors.backlash_mm, way);
   }
   if (!within_strokes(machine.as_built, lengths)) return std::nullopt;
-  ForwardResult assembled =
-      forward_kinematics(machine.as_built, lengths, machine.nominal.B_from_P(Pose{}));
+  ForwardResult assembled = forward_kinematics(machine.as_built, lengths, machine.nominal.B_from_P(Pose{}));
   if (assembled.status != ForwardStatus::converged) return std::nullopt;
   if (errors.leg_compliance_mm_per_n > 0) {
     const LegVector forces = leg_forces_n(machine.as_built, *assembled.B_from_P, errors.payload_n);
@@ -134,7 +133,8 @@ LegVector commanded_readings(const PlatformGeometry& nominal, const Pose& target
   return readings_from_lengths(nominal, leg_lengths(nominal, nominal.B_from_P(target)));
 }
 
-std::optional<Pose> true_pose(const VirtualMachine& machine, const LegVector& readings, const LegVector& before) {
+std::optional<Pose> true_pose(const VirtualMachine& machine, const LegVector& readings,
+                              const LegVector& before) {
   const std::optional<Rigid3> B_from_P = true_B_from_P(machine, readings, before);
   if (!B_from_P) return std::nullopt;
   return machine.as_built.pose_from_B_from_P(*B_from_P);
@@ -146,8 +146,8 @@ std::vector<TargetPose> random_targets(const VirtualMachine& machine, std::uint6
   RandomSource random(seed, 2);
   for (int attempt = 0; static_cast<int>(targets.size()) <= count; ++attempt) {
     if (attempt > 1000 * (count + 1)) {
-      throw InputError(fmt::format("no reachable poses within +-{} mm and +-{} deg", range_mm,
-                                   range_rad * kDegPerRad));
+      throw InputError(
+          fmt::format("no reachable poses within +-{} mm and +-{} deg", range_mm, range_rad * kDegPerRad));
     }
     const Pose pose = random_pose(random, range_mm, range_rad);
     const LegVector readings = commanded_readings(machine.nominal, pose);

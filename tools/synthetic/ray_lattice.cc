@@ -51,7 +51,8 @@ RayLattice::RayLattice(const CameraModel& camera)
   });
 }
 
-void RayLattice::row(double x0_px, double y_px, int count, std::vector<double>& x, std::vector<double>& y) const {
+void RayLattice::row(double x0_px, double y_px, int count, std::vector<double>& x,
+                     std::vector<double>& y) const {
   x.resize(static_cast<std::size_t>(count));
   y.resize(static_cast<std::size_t>(count));
   const NodePosition vertical = node_position(y_px, rows_);

@@ -7,8 +7,8 @@
 
 namespace hexcal {
 
-/// The inverse of a lens as a table: normalised coordinates of any pixel by cubic interpolation between nodes 8
-/// px apart, within 1e-4 px of CameraModel::normalised_from_image.
+/// The inverse of a lens as a table: normalised coordinates of any pixel by cubic interpolation between nodes
+/// 8 px apart, within 1e-4 px of CameraModel::normalised_from_image.
 class RayLattice {
  public:
   /// Throws InputError if the lens has no inverse somewhere in the frame.

@@ -56,8 +56,9 @@ Scene sheet_scene(const Sheet& sheet, const SheetPrint& print, std::uint64_t see
   table.background = true;
   RandomSource random(seed, 4);
   for (int i = 0; i < 40; ++i) {
-    table.decals.push_back(block({random.uniform(-700, 700), random.uniform(-600, 600)}, random.uniform(15, 120),
-                                 i % 3 == 0, static_cast<float>(random.uniform(0.05, 0.6))));
+    table.decals.push_back(block({random.uniform(-700, 700), random.uniform(-600, 600)},
+                                 random.uniform(15, 120), i % 3 == 0,
+                                 static_cast<float>(random.uniform(0.05, 0.6))));
   }
   scene.surfaces.push_back(table);
   return scene;

@@ -7,9 +7,9 @@ namespace hexcal {
 
 /// How a printed sheet differs from its drawing.
 struct SheetPrint {
-  Eigen::Vector2d scale{1, 1};                           ///< longer by this factor in x and y
-  Eigen::Vector2d warp_mm = Eigen::Vector2d::Zero();     ///< SheetWarp's heights over the pattern's extent
-  double margin_mm = 20;                                 ///< white paper around the pattern
+  Eigen::Vector2d scale{1, 1};                        ///< longer by this factor in x and y
+  Eigen::Vector2d warp_mm = Eigen::Vector2d::Zero();  ///< SheetWarp's heights over the pattern's extent
+  double margin_mm = 20;                              ///< white paper around the pattern
 };
 
 /// A printed sheet; its frame is that of SheetGeometry.

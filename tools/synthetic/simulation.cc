@@ -130,7 +130,8 @@ cv::Mat photograph(const VirtualLaboratory& laboratory, const RayLattice& lens, 
   OpticsOptions optics;
   optics.blur_px = shot.blur_px;
   optics.exposure = shot.exposure;
-  const SensorImage light = render(shot_scene(laboratory, shot), lens, shot.camera_from_world, optics, shot.seed);
+  const SensorImage light =
+      render(shot_scene(laboratory, shot), lens, shot.camera_from_world, optics, shot.seed);
   return develop(light, laboratory.options.sensor, shot.seed);
 }
 

@@ -18,14 +18,14 @@ namespace hexcal {
 /// Everything that determines a simulated campaign: the same options give the same bytes.
 struct SimulationOptions {
   std::uint64_t seed = 1;
-  int poses = 12;              ///< beside home
-  int photos_per_pose = 3;     ///< 0: none
-  int calibration_photos = 14; ///< of the sheet
+  int poses = 12;               ///< beside home
+  int photos_per_pose = 3;      ///< 0: none
+  int calibration_photos = 14;  ///< of the sheet
   int width_px = kSensorWidthPx;
-  bool brown_lens = false;     ///< otherwise the public profile of the 18-105
+  bool brown_lens = false;  ///< otherwise the public profile of the 18-105
   double focal_mm = 35;
-  double distance_mm = 700;    ///< from the camera to the grips at 35 mm; grows with the focal length
-  double range_mm = 30;        ///< of the poses, each way
+  double distance_mm = 700;  ///< from the camera to the grips at 35 mm; grows with the focal length
+  double range_mm = 30;      ///< of the poses, each way
   double range_deg = 12;
   MarkerLayout markers;
   double known_sigma_mm = 0.002;  ///< of the fixed markers' coordinates given in markers_nominal.csv
@@ -54,10 +54,10 @@ struct VirtualLaboratory {
 
 /// One photograph to be taken.
 struct Shot {
-  std::string pose;            ///< id; empty for a photograph of the sheet
-  std::string file;            ///< DSC_0001.jpg
-  Rigid3 UG_from_LG;           ///< where the moving grip stands
-  Rigid3 camera_from_world;    ///< world: UG, or the sheet's frame
+  std::string pose;          ///< id; empty for a photograph of the sheet
+  std::string file;          ///< DSC_0001.jpg
+  Rigid3 UG_from_LG;         ///< where the moving grip stands
+  Rigid3 camera_from_world;  ///< world: UG, or the sheet's frame
   double blur_px = 0.8;
   double exposure = 1;
   PhotographTags tags;
@@ -71,14 +71,16 @@ struct RoundPose {
 };
 
 /// Shots of all poses, numbered on from `first_number`. `round` tells repeated visits to a pose apart.
-[[nodiscard]] std::vector<Shot> pose_shots(const VirtualLaboratory& laboratory, const std::vector<RoundPose>& poses,
-                                           std::uint64_t round, int first_number);
+[[nodiscard]] std::vector<Shot> pose_shots(const VirtualLaboratory& laboratory,
+                                           const std::vector<RoundPose>& poses, std::uint64_t round,
+                                           int first_number);
 [[nodiscard]] std::vector<Shot> calibration_shots(const VirtualLaboratory& laboratory, int first_number);
 
 /// Scene of a shot.
 [[nodiscard]] Scene shot_scene(const VirtualLaboratory& laboratory, const Shot& shot);
 
 /// The finished photograph, CV_8UC3.
-[[nodiscard]] cv::Mat photograph(const VirtualLaboratory& laboratory, const RayLattice& lens, const Shot& shot);
+[[nodiscard]] cv::Mat photograph(const VirtualLaboratory& laboratory, const RayLattice& lens,
+                                 const Shot& shot);
 
 }  // namespace hexcal

@@ -28,7 +28,8 @@ std::string format_simulation_file(const std::string& head, const SimulationOpti
       "machine: {{joint_sigma_mm: {}, leg_offset_sigma_mm: {}, leg_scale_sigma: {}, stroke_wave_mm: {}, "
       "backlash_mm: {}, leg_compliance_mm_per_n: {}, payload_n: {}}}\n",
       o.machine.joint_sigma_mm, o.machine.leg_offset_sigma_mm, o.machine.leg_scale_sigma,
-      o.machine.stroke_wave_mm, o.machine.backlash_mm, o.machine.leg_compliance_mm_per_n, o.machine.payload_n);
+      o.machine.stroke_wave_mm, o.machine.backlash_mm, o.machine.leg_compliance_mm_per_n,
+      o.machine.payload_n);
   text += fmt::format("sensor: {{full_well_electrons: {}, read_noise: {}, tone: {}, sharpening: {}}}\n",
                       o.sensor.full_well_electrons, o.sensor.read_noise,
                       kToneNames[static_cast<std::size_t>(o.sensor.tone)], o.sensor.sharpening);

@@ -25,11 +25,12 @@ std::vector<Rigid3> pose_stations(RandomSource& random, int count, double distan
   for (int i = 0; i < count; ++i) {
     const double place = count > 1 ? 2.0 * i / (count - 1) - 1 : 0;
     const double azimuth = (kHalfSpreadDeg * place + 3 * random.normal()) * kRadPerDeg;
-    const double elevation = (kElevationsDeg[static_cast<std::size_t>(i % 3)] + 2 * random.normal()) * kRadPerDeg;
+    const double elevation =
+        (kElevationsDeg[static_cast<std::size_t>(i % 3)] + 2 * random.normal()) * kRadPerDeg;
     const double distance = distance_mm * (1 + 0.03 * random.normal());
     const Eigen::Vector3d target(0, 8 * random.normal(), -25 + 6 * random.normal());
-    const Eigen::Vector3d way(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
-                              std::sin(elevation));
+    const Eigen::Vector3d way(std::cos(elevation) * std::cos(azimuth),
+                              std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
     stations.push_back(looking_at(target + distance * way, target, Eigen::Vector3d::UnitZ(),
                                   4 * kRadPerDeg * random.normal()));
   }
@@ -40,7 +41,8 @@ std::vector<Rigid3> sheet_stations(RandomSource& random, int count, const Camera
                                    const Eigen::Vector2d& extent_mm) {
   constexpr double kGoldenAngleDeg = 137.507764;
   // At this distance a frontal photograph just holds the sheet.
-  const double full = camera.fy_px() * std::max(extent_mm.x() / camera.width_px, extent_mm.y() / camera.height_px);
+  const double full =
+      camera.fy_px() * std::max(extent_mm.x() / camera.width_px, extent_mm.y() / camera.height_px);
   std::vector<Rigid3> stations;
   for (int i = 0; i < count; ++i) {
     const double tilt = (i % 5 == 0 ? random.uniform(3, 8) : random.uniform(20, 40)) * kRadPerDeg;
@@ -48,7 +50,8 @@ std::vector<Rigid3> sheet_stations(RandomSource& random, int count, const Camera
     const double distance = full * (i % 5 == 0 ? random.uniform(0.95, 1.1) : random.uniform(0.72, 1.0));
     const Eigen::Vector3d target(extent_mm.x() * random.uniform(-0.16, 0.16),
                                  extent_mm.y() * random.uniform(-0.16, 0.16), 0);
-    const Eigen::Vector3d way(std::sin(tilt) * std::cos(side), std::sin(tilt) * std::sin(side), std::cos(tilt));
+    const Eigen::Vector3d way(std::sin(tilt) * std::cos(side), std::sin(tilt) * std::sin(side),
+                              std::cos(tilt));
     const double quarter = i % 4 == 0 ? 0 : 90.0 * (i % 4);
     stations.push_back(looking_at(target + distance * way, target, Eigen::Vector3d::UnitY(),
                                   (quarter + 5 * random.normal()) * kRadPerDeg));

@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "tools/synthetic/random_source.h"
 #include "kinematics/geometry/rigid3.h"
 #include "photogrammetry/camera/camera_model.h"
+#include "tools/synthetic/random_source.h"
 
 namespace hexcal {
 

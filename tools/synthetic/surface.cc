@@ -21,7 +21,8 @@ int cell_index(double distance_mm, double cell_mm, int count) {
 float decal_albedo(const Decal& decal, const Eigen::Vector2d& p) {
   const double x = p.x() - decal.top_left_mm.x();
   const double y = decal.top_left_mm.y() - p.y();
-  if (x < 0 || y < 0 || x >= decal.columns * decal.cell_mm.x() || y >= decal.rows * decal.cell_mm.y()) return -1;
+  if (x < 0 || y < 0 || x >= decal.columns * decal.cell_mm.x() || y >= decal.rows * decal.cell_mm.y())
+    return -1;
   if (decal.round) {
     const double dx = 2 * x / decal.cell_mm.x() - 1;
     const double dy = 2 * y / decal.cell_mm.y() - 1;
@@ -34,7 +35,8 @@ float decal_albedo(const Decal& decal, const Eigen::Vector2d& p) {
 
 enum class DecalCover { none, uniform, mixed };
 
-DecalCover decal_cover(const Decal& decal, const Eigen::Vector2d& low, const Eigen::Vector2d& high, float& albedo) {
+DecalCover decal_cover(const Decal& decal, const Eigen::Vector2d& low, const Eigen::Vector2d& high,
+                       float& albedo) {
   const Eigen::Vector2d end = lower_right(decal);
   if (high.x() <= decal.top_left_mm.x() || low.x() >= end.x() || high.y() <= end.y() ||
       low.y() >= decal.top_left_mm.y()) {
@@ -122,7 +124,8 @@ bool SurfacePaint::inside(const Eigen::Vector2d& p) const {
 
 float SurfacePaint::albedo(const Eigen::Vector2d& p) const {
   if (decals_.empty()) return base_albedo_;
-  const auto& near = bins_[static_cast<std::size_t>(bin_index(p.y(), 1) * kBins + bin_index(p.x(), 0))].decals;
+  const auto& near =
+      bins_[static_cast<std::size_t>(bin_index(p.y(), 1) * kBins + bin_index(p.x(), 0))].decals;
   for (auto i = near.rbegin(); i != near.rend(); ++i) {
     const float albedo = decal_albedo(decals_[static_cast<std::size_t>(*i)], p);
     if (albedo >= 0) return albedo;

@@ -12,12 +12,12 @@ namespace hexcal {
 
 /// A printed pattern on a surface: a grid of cells, or a round dot filling its single cell.
 struct Decal {
-  Eigen::Vector2d top_left_mm;         ///< corner of the first cell; rows go down (-y), columns right (+x)
-  Eigen::Vector2d cell_mm;             ///< width and height of a cell
+  Eigen::Vector2d top_left_mm;  ///< corner of the first cell; rows go down (-y), columns right (+x)
+  Eigen::Vector2d cell_mm;      ///< width and height of a cell
   int columns = 1;
   int rows = 1;
   bool round = false;
-  std::vector<float> albedo;           ///< columns x rows, row by row; negative: see-through
+  std::vector<float> albedo;  ///< columns x rows, row by row; negative: see-through
 };
 
 /// Height of a warped sheet: z = x_mm (1 - (x/hx)^2) + y_mm (1 - (y/hy)^2), zero on the corners.
@@ -36,12 +36,12 @@ struct Surface {
   Rigid3 world_from_surface;
   std::vector<Eigen::Vector2d> outline_mm;  ///< convex, counter-clockwise seen from +z
   float albedo = 0.5F;
-  std::array<float, 3> tint{1, 1, 1};       ///< colour, about 1
-  float grain = 0;                          ///< relative amplitude of the surface's texture
-  double grain_mm = 1;                      ///< size of one texel of that texture
-  bool background = false;                  ///< its edges need no exact sampling
-  std::vector<Decal> decals;                ///< a later one lies over an earlier one
-  Eigen::Vector2d print_scale{1, 1};        ///< the print is this much larger than drawn, about the origin
+  std::array<float, 3> tint{1, 1, 1};  ///< colour, about 1
+  float grain = 0;                     ///< relative amplitude of the surface's texture
+  double grain_mm = 1;                 ///< size of one texel of that texture
+  bool background = false;             ///< its edges need no exact sampling
+  std::vector<Decal> decals;           ///< a later one lies over an earlier one
+  Eigen::Vector2d print_scale{1, 1};   ///< the print is this much larger than drawn, about the origin
   std::optional<SheetWarp> warp;
 
   /// Where a point of the drawing lies in the surface's frame: print scale, then warp.

@@ -9,11 +9,11 @@
 namespace hexcal {
 namespace {
 
-constexpr int kSub = 4;             // sub-pixels per pixel and axis
-constexpr int kSamples = 256;       // of a pixel with an edge, 16 in each sub-pixel
-constexpr int kRoughSamples = 16;   // where only the background has an edge
-constexpr std::size_t kMaxSeen = 8;   // surfaces in one pixel
-constexpr float kDarkness = 0.004F; // where a ray meets nothing
+constexpr int kSub = 4;              // sub-pixels per pixel and axis
+constexpr int kSamples = 256;        // of a pixel with an edge, 16 in each sub-pixel
+constexpr int kRoughSamples = 16;    // where only the background has an edge
+constexpr std::size_t kMaxSeen = 8;  // surfaces in one pixel
+constexpr float kDarkness = 0.004F;  // where a ray meets nothing
 
 struct NetPoint {
   std::uint8_t x, y;
@@ -41,9 +41,9 @@ constexpr auto kNet = sobol_net();
 }  // namespace
 
 struct TileRenderer::Canvas {
-  int x0, y0;         // first pixel inside the margin
-  int width, height;  // inside the margin
-  int columns, rows;  // with the margin
+  int x0, y0;                        // first pixel inside the margin
+  int width, height;                 // inside the margin
+  int columns, rows;                 // with the margin
   std::vector<double> ray_x, ray_y;  // of the pixels' corners, (columns + 1) x (rows + 1)
   std::vector<int> candidates;
   std::vector<float> light;
@@ -148,7 +148,8 @@ void TileRenderer::shade_pixel(Canvas& canvas, int x, int y) const {
     if (next.footprint.cover == Cover::outside || count == seen.size()) continue;
     // Nearest first.
     std::size_t place = count++;
-    for (; place > 0 && next.depth_mm[0] < seen[place - 1].depth_mm[0]; --place) seen[place] = seen[place - 1];
+    for (; place > 0 && next.depth_mm[0] < seen[place - 1].depth_mm[0]; --place)
+      seen[place] = seen[place - 1];
     seen[place] = next;
   }
   if (count == 0) {
@@ -197,7 +198,8 @@ void TileRenderer::sample_pixel(Canvas& canvas, int x, int y, const std::vector<
   }
   const int samples = exact ? kSamples : kRoughSamples;
   // The same sample positions whichever tile asks for the pixel.
-  const auto key = static_cast<std::uint64_t>((canvas.y0 - margin_px_ + y) * 65536 + canvas.x0 - margin_px_ + x);
+  const auto key =
+      static_cast<std::uint64_t>((canvas.y0 - margin_px_ + y) * 65536 + canvas.x0 - margin_px_ + x);
   const std::uint64_t scramble = mixed_bits(seed_ ^ key);
   const auto flip_x = static_cast<std::uint8_t>(scramble);
   const auto flip_y = static_cast<std::uint8_t>(scramble >> 8);
@@ -242,7 +244,8 @@ void TileRenderer::blur(Canvas& canvas, SensorImage& image) const {
   };
   for (int y = 0; y < canvas.height; ++y) {
     std::copy_n(&canvas.light[source(0, y)], canvas.width, image.light.ptr<float>(canvas.y0 + y) + canvas.x0);
-    std::copy_n(&canvas.tint[source(0, y)], canvas.width, image.tint.ptr<std::uint8_t>(canvas.y0 + y) + canvas.x0);
+    std::copy_n(&canvas.tint[source(0, y)], canvas.width,
+                image.tint.ptr<std::uint8_t>(canvas.y0 + y) + canvas.x0);
   }
   if (canvas.edges.empty()) return;  // what is smooth stays what it is
   const int wide = canvas.columns * kSub;

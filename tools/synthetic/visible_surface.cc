@@ -42,7 +42,8 @@ const std::vector<float>& grain_texture() {
 
 }  // namespace
 
-VisibleSurface::VisibleSurface(const Surface& surface, const Lamp& lamp, const Rigid3& camera_from_world, int index)
+VisibleSurface::VisibleSurface(const Surface& surface, const Lamp& lamp, const Rigid3& camera_from_world,
+                               int index)
     : paint_(surface),
       warp_(surface.warp),
       drawn_per_printed_(surface.print_scale.cwiseInverse()),
@@ -70,8 +71,8 @@ VisibleSurface::VisibleSurface(const Surface& surface, const Lamp& lamp, const R
     return base * lamp.gradient_per_mm.dot(surface.world_from_surface.rotation * axis);
   };
   const double origin = base * (1 + lamp.gradient_per_mm.dot(surface.world_from_surface.translation));
-  irradiance_ = Eigen::Vector3d(origin, slope(Eigen::Vector3d::UnitX()), slope(Eigen::Vector3d::UnitY()))
-                    .cast<float>();
+  irradiance_ =
+      Eigen::Vector3d(origin, slope(Eigen::Vector3d::UnitX()), slope(Eigen::Vector3d::UnitY())).cast<float>();
 }
 
 VisibleSurface::Hit VisibleSurface::hit(double x, double y) const {
