@@ -51,35 +51,35 @@ RayLattice::RayLattice(const CameraModel& camera)
   });
 }
 
-void RayLattice::row(double x0_px, double y_px, int count, std::vector<double>& x,
-                     std::vector<double>& y) const {
-  x.resize(static_cast<std::size_t>(count));
-  y.resize(static_cast<std::size_t>(count));
-  const NodePosition vertical = node_position(y_px, rows_);
-  const int first = node_position(x0_px, columns_).first;
-  const int last = node_position(x0_px + count - 1, columns_).first + 3;
-  std::vector<Eigen::Vector2d> line(static_cast<std::size_t>(last - first + 1), Eigen::Vector2d::Zero());
-  for (int k = 0; k < 4; ++k) {
-    const auto start = static_cast<std::size_t>((vertical.first + k) * columns_ + first);
+void RayLattice::rays(const Eigen::Vector2d& first_px, int columns, int rows,
+                      std::vector<Eigen::Vector2d>& rays) const {
+  rays.resize(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+  std::vector<NodePosition> across;
+  for (int i = 0; i < columns; ++i) across.push_back(node_position(first_px.x() + i, columns_));
+  const int low = across.front().first;
+  std::vector<Eigen::Vector2d> line(static_cast<std::size_t>(across.back().first + 4 - low));
+  auto ray = rays.begin();
+  for (int row = 0; row < rows; ++row) {
+    const NodePosition down = node_position(first_px.y() + row, rows_);
+    const Eigen::Vector2d* node = &nodes_[static_cast<std::size_t>(down.first * columns_ + low)];
     for (std::size_t i = 0; i < line.size(); ++i) {
-      line[i] += vertical.weights[static_cast<std::size_t>(k)] * nodes_[start + i];
+      const auto& w = down.weights;
+      line[i] = w[0] * node[i] + w[1] * node[i + static_cast<std::size_t>(columns_)] +
+                w[2] * node[i + 2 * static_cast<std::size_t>(columns_)] +
+                w[3] * node[i + 3 * static_cast<std::size_t>(columns_)];
     }
-  }
-  for (int i = 0; i < count; ++i) {
-    const NodePosition horizontal = node_position(x0_px + i, columns_);
-    const Eigen::Vector2d* node = &line[static_cast<std::size_t>(horizontal.first - first)];
-    const auto& w = horizontal.weights;
-    const Eigen::Vector2d ray = w[0] * node[0] + w[1] * node[1] + w[2] * node[2] + w[3] * node[3];
-    x[static_cast<std::size_t>(i)] = ray.x();
-    y[static_cast<std::size_t>(i)] = ray.y();
+    for (const NodePosition& position : across) {
+      const Eigen::Vector2d* near = &line[static_cast<std::size_t>(position.first - low)];
+      const auto& w = position.weights;
+      *ray++ = w[0] * near[0] + w[1] * near[1] + w[2] * near[2] + w[3] * near[3];
+    }
   }
 }
 
 Eigen::Vector2d RayLattice::at(const Eigen::Vector2d& px) const {
-  std::vector<double> x;
-  std::vector<double> y;
-  row(px.x(), px.y(), 1, x, y);
-  return {x[0], y[0]};
+  std::vector<Eigen::Vector2d> ray;
+  rays(px, 1, 1, ray);
+  return ray.front();
 }
 
 }  // namespace hexcal

@@ -14,8 +14,8 @@ class RayLattice {
   /// Throws InputError if the lens has no inverse somewhere in the frame.
   explicit RayLattice(const CameraModel& camera);
 
-  /// Rays of the pixel positions (x0 + i, y), i = 0 .. count - 1, into x and y (resized).
-  void row(double x0_px, double y_px, int count, std::vector<double>& x, std::vector<double>& y) const;
+  /// Rays of the pixel positions first + (column, row), row by row into `rays` (resized).
+  void rays(const Eigen::Vector2d& first_px, int columns, int rows, std::vector<Eigen::Vector2d>& rays) const;
   [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector2d& px) const;
 
   [[nodiscard]] const CameraModel& camera() const { return camera_; }

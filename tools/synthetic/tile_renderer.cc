@@ -9,9 +9,10 @@
 namespace hexcal {
 namespace {
 
-constexpr int kSub = 4;              // sub-pixels per pixel and axis
-constexpr int kSamples = 256;        // of a pixel with an edge, 16 in each sub-pixel
-constexpr int kRoughSamples = 16;    // where only the background has an edge
+constexpr int kSub = 4;            // sub-pixels per pixel and axis
+constexpr int kSamples = 256;      // of a pixel with an edge, 16 in each sub-pixel
+constexpr int kRoughSamples = 16;  // where only the background has an edge
+constexpr int kBlockPx = 8;
 constexpr std::size_t kMaxSeen = 8;  // surfaces in one pixel
 constexpr float kDarkness = 0.004F;  // where a ray meets nothing
 
@@ -41,10 +42,10 @@ constexpr auto kNet = sobol_net();
 }  // namespace
 
 struct TileRenderer::Canvas {
-  int x0, y0;                        // first pixel inside the margin
-  int width, height;                 // inside the margin
-  int columns, rows;                 // with the margin
-  std::vector<double> ray_x, ray_y;  // of the pixels' corners, (columns + 1) x (rows + 1)
+  int x0, y0;                         // first pixel inside the margin
+  int width, height;                  // inside the margin
+  int columns, rows;                  // with the margin
+  std::vector<Eigen::Vector2d> rays;  // of the pixels' corners, (columns + 1) x (rows + 1)
   std::vector<int> candidates;
   std::vector<float> light;
   std::vector<std::uint8_t> tint;
@@ -53,12 +54,22 @@ struct TileRenderer::Canvas {
     std::array<float, kSub * kSub> light;
   };
   std::vector<Edge> edges;
-  std::vector<int> seen;
 
-  [[nodiscard]] Eigen::Vector2d corner(int x, int y) const {
-    const auto i = static_cast<std::size_t>(y * (columns + 1) + x);
-    return {ray_x[i], ray_y[i]};
+  [[nodiscard]] const Eigen::Vector2d& corner(int x, int y) const {
+    return rays[static_cast<std::size_t>(y * (columns + 1) + x)];
   }
+};
+
+// Pixels x0 .. x1 - 1, y0 .. y1 - 1 of a canvas.
+struct TileRenderer::Block {
+  int x0, y0, x1, y1;
+};
+
+struct TileRenderer::Seen {
+  int surface;
+  Footprint footprint;
+  Eigen::Vector4d depth_mm;  // at the corners, 0 where the surface is seen edge-on or from behind
+  Eigen::Vector2d middle;    // in the drawing's frame
 };
 
 TileRenderer::TileRenderer(const Scene& scene, const RayLattice& lens, const Rigid3& camera_from_world,
@@ -93,94 +104,118 @@ void TileRenderer::tile(int x0, int y0, SensorImage& image) const {
   canvas.light.assign(pixels, 0.0F);
   canvas.tint.assign(pixels, 0);
   trace(canvas);
-  for (int y = 0; y < canvas.rows; ++y) {
-    for (int x = 0; x < canvas.columns; ++x) shade_pixel(canvas, x, y);
-  }
+  shade(canvas);
   blur(canvas, image);
 }
 
 void TileRenderer::trace(Canvas& canvas) const {
-  std::vector<double> x;
-  std::vector<double> y;
-  for (int row = 0; row <= canvas.rows; ++row) {
-    lens_.row(canvas.x0 - margin_px_ - 0.5, canvas.y0 - margin_px_ + row - 0.5, canvas.columns + 1, x, y);
-    canvas.ray_x.insert(canvas.ray_x.end(), x.begin(), x.end());
-    canvas.ray_y.insert(canvas.ray_y.end(), y.begin(), y.end());
+  lens_.rays({canvas.x0 - margin_px_ - 0.5, canvas.y0 - margin_px_ - 0.5}, canvas.columns + 1,
+             canvas.rows + 1, canvas.rays);
+  Eigen::Vector2d low = canvas.rays.front();
+  Eigen::Vector2d high = low;
+  for (const Eigen::Vector2d& ray : canvas.rays) {
+    low = low.cwiseMin(ray);
+    high = high.cwiseMax(ray);
   }
-  const auto [x_low, x_high] = std::minmax_element(canvas.ray_x.begin(), canvas.ray_x.end());
-  const auto [y_low, y_high] = std::minmax_element(canvas.ray_y.begin(), canvas.ray_y.end());
   for (std::size_t i = 0; i < surfaces_.size(); ++i) {
-    if (surfaces_[i].may_meet({*x_low, *y_low}, {*x_high, *y_high})) {
+    if (surfaces_[i].may_meet(low, high)) {
       canvas.candidates.push_back(static_cast<int>(i));
     }
   }
 }
 
-// Decides whether the pixel shows one plain piece of one surface, or must be sampled.
-void TileRenderer::shade_pixel(Canvas& canvas, int x, int y) const {
-  const auto pixel = static_cast<std::size_t>(y * canvas.columns + x);
-  const std::array<Eigen::Vector2d, 4> corners{canvas.corner(x, y), canvas.corner(x + 1, y),
-                                               canvas.corner(x + 1, y + 1), canvas.corner(x, y + 1)};
-  struct Seen {
-    int surface;
-    Footprint footprint;
-    Eigen::Vector4d depth_mm;  // at the corners
-    Eigen::Vector2d middle;
-  };
-  std::array<Seen, kMaxSeen> seen;
-  std::size_t count = 0;
-  for (const int candidate : canvas.candidates) {
+// What a rectangle of pixels can show, nearest first, without what is wholly hidden. `widen` allows for the
+// lens: how far, relative to its size, the rectangle on a surface may exceed the hull of its corners.
+void TileRenderer::classify(const Canvas& canvas, const Block& block, const std::vector<int>& candidates,
+                            double widen, std::vector<Seen>& seen) const {
+  const std::array<Eigen::Vector2d, 4> corners{
+      canvas.corner(block.x0, block.y0), canvas.corner(block.x1, block.y0), canvas.corner(block.x1, block.y1),
+      canvas.corner(block.x0, block.y1)};
+  seen.clear();
+  for (const int candidate : candidates) {
     const VisibleSurface& surface = surfaces_[static_cast<std::size_t>(candidate)];
     Eigen::Vector2d low;
     Eigen::Vector2d high;
     Seen next{candidate, {}, Eigen::Vector4d::Zero(), Eigen::Vector2d::Zero()};
-    bool behind = false;
-    for (std::size_t k = 0; k < 4 && !behind; ++k) {
+    int missed = 0;
+    for (std::size_t k = 0; k < 4; ++k) {
       const VisibleSurface::Hit hit = surface.hit(corners[k].x(), corners[k].y());
-      behind = hit.depth_mm <= 0;
+      missed += hit.depth_mm <= 0 ? 1 : 0;
       low = k == 0 ? hit.at : Eigen::Vector2d(low.cwiseMin(hit.at));
       high = k == 0 ? hit.at : Eigen::Vector2d(high.cwiseMax(hit.at));
       next.depth_mm[static_cast<Eigen::Index>(k)] = hit.depth_mm;
       next.middle += 0.25 * hit.at;
     }
-    if (behind) continue;
-    next.footprint = surface.paint().footprint(low, high);
-    if (next.footprint.cover == Cover::outside || count == seen.size()) continue;
-    // Nearest first.
-    std::size_t place = count++;
-    for (; place > 0 && next.depth_mm[0] < seen[place - 1].depth_mm[0]; --place)
-      seen[place] = seen[place - 1];
-    seen[place] = next;
+    if (missed == 4) continue;
+    const Eigen::Vector2d more = widen * (high - low);
+    // A surface seen edge-on within the rectangle has no footprint there.
+    next.footprint =
+        missed > 0 ? Footprint{Cover::partly, 0} : surface.paint().footprint(low - more, high + more);
+    if (next.footprint.cover == Cover::outside) continue;
+    const auto place = std::find_if(seen.begin(), seen.end(),
+                                    [&](const Seen& other) { return next.depth_mm[0] < other.depth_mm[0]; });
+    seen.insert(place, next);
   }
-  if (count == 0) {
-    canvas.light[pixel] = kDarkness;
-    return;
-  }
-  // Surfaces behind one that covers the whole pixel do not matter.
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i < seen.size(); ++i) {
     if (seen[i].footprint.cover == Cover::partly) continue;
     const Eigen::Vector4d cover = seen[i].depth_mm;
-    std::size_t kept = i + 1;
-    for (std::size_t k = i + 1; k < count; ++k) {
-      if ((seen[k].depth_mm.array() <= cover.array()).any()) seen[kept++] = seen[k];
-    }
-    count = kept;
+    const auto hidden = [&](const Seen& other) { return (other.depth_mm.array() > cover.array()).all(); };
+    seen.erase(std::remove_if(seen.begin() + static_cast<std::ptrdiff_t>(i) + 1, seen.end(), hidden),
+               seen.end());
     break;
   }
-  const Seen& front = seen[0];
-  const VisibleSurface& surface = surfaces_[static_cast<std::size_t>(front.surface)];
-  canvas.tint[pixel] = static_cast<std::uint8_t>(surface.index());
-  if (count == 1 && front.footprint.cover == Cover::uniform) {
-    canvas.light[pixel] =
-        front.footprint.albedo * surface.irradiance(front.middle) * surface.grain(front.middle);
-    return;
-  }
-  canvas.seen.clear();
-  for (std::size_t i = 0; i < count; ++i) canvas.seen.push_back(seen[i].surface);
-  sample_pixel(canvas, x, y, canvas.seen);
 }
 
-void TileRenderer::sample_pixel(Canvas& canvas, int x, int y, const std::vector<int>& seen) const {
+// Blocks that show one plain piece of one surface are filled; in others each pixel is looked at.
+void TileRenderer::shade(Canvas& canvas) const {
+  std::vector<Seen> seen;
+  std::vector<int> near;
+  for (int y0 = 0; y0 < canvas.rows; y0 += kBlockPx) {
+    for (int x0 = 0; x0 < canvas.columns; x0 += kBlockPx) {
+      const Block block{x0, y0, std::min(x0 + kBlockPx, canvas.columns),
+                        std::min(y0 + kBlockPx, canvas.rows)};
+      classify(canvas, block, canvas.candidates, 0.03, seen);
+      near.clear();
+      for (const Seen& one : seen) near.push_back(one.surface);
+      const bool plain = seen.size() == 1 && seen[0].footprint.cover == Cover::uniform;
+      const float albedo = plain ? seen[0].footprint.albedo : 0;
+      for (int y = y0; y < block.y1; ++y) {
+        for (int x = x0; x < block.x1; ++x) {
+          if (plain) {
+            const VisibleSurface& surface = surfaces_[static_cast<std::size_t>(near[0])];
+            const Eigen::Vector2d ray = 0.5 * (canvas.corner(x, y) + canvas.corner(x + 1, y + 1));
+            fill(canvas, x, y, surface, albedo, surface.hit(ray.x(), ray.y()).at);
+          } else {
+            shade_pixel(canvas, x, y, near, seen);
+          }
+        }
+      }
+    }
+  }
+}
+
+void TileRenderer::fill(Canvas& canvas, int x, int y, const VisibleSurface& surface, float albedo,
+                        const Eigen::Vector2d& at) const {
+  const auto pixel = static_cast<std::size_t>(y * canvas.columns + x);
+  canvas.light[pixel] = albedo * surface.irradiance(at) * surface.grain(at);
+  canvas.tint[pixel] = static_cast<std::uint8_t>(surface.index());
+}
+
+void TileRenderer::shade_pixel(Canvas& canvas, int x, int y, const std::vector<int>& candidates,
+                               std::vector<Seen>& seen) const {
+  classify(canvas, {x, y, x + 1, y + 1}, candidates, 0, seen);
+  if (seen.empty()) {
+    canvas.light[static_cast<std::size_t>(y * canvas.columns + x)] = kDarkness;
+  } else if (seen.size() == 1 && seen[0].footprint.cover == Cover::uniform) {
+    fill(canvas, x, y, surfaces_[static_cast<std::size_t>(seen[0].surface)], seen[0].footprint.albedo,
+         seen[0].middle);
+  } else {
+    if (seen.size() > kMaxSeen) seen.resize(kMaxSeen);
+    sample_pixel(canvas, x, y, seen);
+  }
+}
+
+void TileRenderer::sample_pixel(Canvas& canvas, int x, int y, const std::vector<Seen>& seen) const {
   const auto pixel = static_cast<std::size_t>(y * canvas.columns + x);
   const Eigen::Vector2d a = canvas.corner(x, y);
   const Eigen::Vector2d b = canvas.corner(x + 1, y);
@@ -191,7 +226,7 @@ void TileRenderer::sample_pixel(Canvas& canvas, int x, int y, const std::vector<
   std::array<float, kMaxSeen> factor{};
   bool exact = false;
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    const VisibleSurface& surface = surfaces_[static_cast<std::size_t>(seen[i])];
+    const VisibleSurface& surface = surfaces_[static_cast<std::size_t>(seen[i].surface)];
     const VisibleSurface::Hit hit = surface.hit(middle.x(), middle.y());
     factor[i] = surface.irradiance(hit.at) * surface.grain(hit.at);
     exact = exact || !surface.background();
@@ -218,7 +253,7 @@ void TileRenderer::sample_pixel(Canvas& canvas, int x, int y, const std::vector<
     float light = kDarkness;
     std::size_t front = 0;
     for (std::size_t k = 0; k < seen.size(); ++k) {
-      const VisibleSurface& surface = surfaces_[static_cast<std::size_t>(seen[k])];
+      const VisibleSurface& surface = surfaces_[static_cast<std::size_t>(seen[k].surface)];
       const VisibleSurface::Hit hit = surface.hit(ray.x(), ray.y());
       if (hit.depth_mm <= 0 || hit.depth_mm >= nearest || !surface.paint().inside(hit.at)) continue;
       nearest = hit.depth_mm;
@@ -233,7 +268,7 @@ void TileRenderer::sample_pixel(Canvas& canvas, int x, int y, const std::vector<
   for (float& light : edge.light) light *= per_sub_pixel;
   canvas.light[pixel] = total / static_cast<float>(samples);
   const auto most = std::max_element(count_of.begin(), count_of.end()) - count_of.begin();
-  canvas.tint[pixel] = static_cast<std::uint8_t>(seen[static_cast<std::size_t>(most)]);
+  canvas.tint[pixel] = static_cast<std::uint8_t>(seen[static_cast<std::size_t>(most)].surface);
   canvas.edges.push_back(edge);
 }
 

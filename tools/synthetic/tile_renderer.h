@@ -52,9 +52,17 @@ class TileRenderer {
 
  private:
   struct Canvas;
+  struct Block;
+  struct Seen;
   void trace(Canvas& canvas) const;
-  void shade_pixel(Canvas& canvas, int x, int y) const;
-  void sample_pixel(Canvas& canvas, int x, int y, const std::vector<int>& seen) const;
+  void classify(const Canvas& canvas, const Block& block, const std::vector<int>& candidates, double widen,
+                std::vector<Seen>& seen) const;
+  void shade(Canvas& canvas) const;
+  void fill(Canvas& canvas, int x, int y, const VisibleSurface& surface, float albedo,
+            const Eigen::Vector2d& at) const;
+  void shade_pixel(Canvas& canvas, int x, int y, const std::vector<int>& candidates,
+                   std::vector<Seen>& seen) const;
+  void sample_pixel(Canvas& canvas, int x, int y, const std::vector<Seen>& seen) const;
   void blur(Canvas& canvas, SensorImage& image) const;
 
   const RayLattice& lens_;
