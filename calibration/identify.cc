@@ -11,6 +11,7 @@
 #include "calibration/normal_equations.h"
 #include "kinematics/geometry/covariance.h"
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/screw.h"
 
 namespace hexcal {
 namespace {
@@ -91,6 +92,8 @@ class Identification {
                  const IdentifyOptions& options)
       : observations_(observations), options_(options) {
     nominal_.geometry = nominal;
+    if (options.screw_lead && !nominal.screw)
+      nominal_.geometry.screw = screw_with_tangential_axes(nominal, 0.0);
     result_.layout.curve_terms = options.curve_terms;
     result_.selection = select(options, result_.layout);
     result_.corrections.setZero(result_.layout.size());
@@ -127,16 +130,36 @@ class Identification {
     }
     filled_.resize(observations_.poses.size());
     for (std::size_t i = 0; i < filled_.size(); ++i) filled_[i] = observations_.poses[i].measured;
-    bool settled = false;
+    // The parameters converge first, then the noise beside them, then the tolerances beside both: residuals
+    // of a fit that has not converged would pass for noise, and noise for tolerances that are too wide.
+    enum class Phase { parameters, noise, tolerances, settled };
+    Phase phase = Phase::parameters;
+    int in_phase = 0;
     for (int i = 1; i <= options_.max_iterations; ++i) {
       result_.iterations = i;
-      const bool hyper = i >= 3 && !settled;
-      if (!linearize() || !step(hyper)) return result_;
-      // Noise and tolerances first settle beside the parameters; then the parameters converge under them.
-      if (hyper && (hyper_change_ < 2e-3 || i > options_.max_iterations - 15)) settled = true;
-      if (settled && step_squares_ < 1e-16 * std::max(1.0, rows_)) {
-        finish();
-        return result_;
+      adapt_tolerances_ = options_.adapt_tolerances && phase == Phase::tolerances;
+      if (!linearize() || !step(phase == Phase::noise || phase == Phase::tolerances)) return result_;
+      ++in_phase;
+      const auto advance = [&](Phase next) {
+        phase = next;
+        in_phase = 0;
+      };
+      switch (phase) {
+        case Phase::parameters:
+          if (step_squares_ < 1e-3 * rows_ || in_phase == 12) advance(Phase::noise);
+          break;
+        case Phase::noise:
+          if (hyper_change_ < 0.05 || in_phase == 10) advance(Phase::tolerances);
+          break;
+        case Phase::tolerances:
+          if (hyper_change_ < 2e-3 || i > options_.max_iterations - 15) advance(Phase::settled);
+          break;
+        case Phase::settled:
+          if (step_squares_ < 1e-16 * std::max(1.0, rows_)) {
+            finish();
+            return result_;
+          }
+          break;
       }
     }
     if (step_squares_ < 1e-6 * rows_) {
@@ -261,7 +284,7 @@ class Identification {
         if (noise_.leg_sigma_mm < 0.1 * options_.leg_sigma_mm) hyper_change_ = 0;
       }
     }
-    if (!options_.adapt_tolerances) return;
+    if (!adapt_tolerances_) return;
     for (const ParameterKind kind : {ParameterKind::joint, ParameterKind::offset, ParameterKind::scale,
                                      ParameterKind::curve, ParameterKind::sag, ParameterKind::backlash}) {
       double determined = 0;
@@ -349,6 +372,7 @@ class Identification {
   double rows_ = 0;
   double step_squares_ = kInfinity;
   double hyper_change_ = 0;
+  bool adapt_tolerances_ = false;
 };
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <algorithm>
 
 #include "kinematics/geometry/covariance.h"
+#include "kinematics/jacobian.h"
+#include "kinematics/screw.h"
 
 namespace hexcal {
 
@@ -12,8 +14,8 @@ LegLinearization linearize_legs(const MachineModel& machine, const MachineModel&
                                 const LegVector& readings, const LegVector& approach) {
   const PlatformGeometry& geometry = machine.geometry;
   const Rigid3 B_from_P = geometry.B_from_P(measured);
-  const Eigen::Matrix3d R = B_from_P.rotation_matrix();
-  const Matrix6d legs = leg_jacobian(geometry, B_from_P);
+  const Matrix6d legs = actuated_jacobian(geometry, B_from_P);
+  const ReadingJacobians by_joints = reading_jacobians(geometry, B_from_P);
 
   LegLinearization out;
   out.residuals_mm = actuator_lengths(machine, measured) - actuator_output(machine, readings, approach);
@@ -21,11 +23,12 @@ LegLinearization linearize_legs(const MachineModel& machine, const MachineModel&
   out.jacobian.setZero(6, layout.size());
   for (Eigen::Index k = 0; k < 6; ++k) {
     const auto leg = static_cast<std::size_t>(k);
-    const Eigen::RowVector3d u = legs.row(k).head<3>();
+    const double mm_per_unit = geometry.actuators[leg].mm_per_unit;
     const Eigen::Index at = ParameterLayout::kPerLeg * k;
     const double center = 0.5 * (stroke_range(k, 0) + stroke_range(k, 1));
-    out.jacobian.row(k).segment<3>(at) = -u;
-    out.jacobian.row(k).segment<3>(at + 3) = u * R;
+    out.jacobian.row(k).segment<3>(at) = mm_per_unit * by_joints.by_base.row(k);
+    out.jacobian.row(k).segment<3>(at + 3) = mm_per_unit * by_joints.by_platform.row(k);
+    out.jacobian(k, ParameterLayout::kLead) = mm_per_unit * by_joints.by_lead[k];
     out.jacobian(k, at + 6) = -1.0;
     out.jacobian(k, at + 7) = -nominal.geometry.actuators[leg].mm_per_unit * (readings[k] - center);
     out.jacobian(k, layout.backlash() + k) = -0.5 * approach[k];

@@ -16,8 +16,8 @@ struct LegLinearization {
 };
 
 /// `nominal` is the machine to which the corrections apply, `machine` the corrected one; `stroke_range` as in
-/// corrected_machine. The influence of geometry on twist and sag is neglected in the Jacobian, not in the
-/// residual: both are small corrections themselves.
+/// corrected_machine. The influence of geometry on the sag is neglected in the Jacobian, not in the
+/// residual: it is a small correction itself.
 [[nodiscard]] LegLinearization linearize_legs(const MachineModel& machine, const MachineModel& nominal,
                                               const ParameterLayout& layout,
                                               const Eigen::Matrix<double, 6, 2>& stroke_range,

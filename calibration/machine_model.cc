@@ -6,6 +6,7 @@
 
 #include "kinematics/forward.h"
 #include "kinematics/geometry/covariance.h"
+#include "kinematics/screw.h"
 
 namespace hexcal {
 namespace {
@@ -67,7 +68,7 @@ Eigen::Matrix<double, 6, 4> sag_basis(const PlatformGeometry& geometry, const Ri
 
 LegVector actuator_lengths(const MachineModel& machine, const Pose& pose) {
   const Rigid3 B_from_P = machine.geometry.B_from_P(pose);
-  LegVector lengths = leg_lengths(machine.geometry, B_from_P);
+  LegVector lengths = actuated_lengths(machine.geometry, B_from_P);
   if (!machine.sag.isZero(0)) lengths -= sag_basis(machine.geometry, B_from_P) * machine.sag;
   return lengths;
 }
@@ -122,7 +123,7 @@ Matrix6d leg_by_pose_jacobian(const PlatformGeometry& geometry, const Pose& pose
   const Rigid3 home_from_LG = home_from_lg(pose);
   const Rigid3 LG_from_P = inverse(geometry.P_from_LG);
   const Rigid3 home_from_P = home_from_LG * LG_from_P;
-  return leg_jacobian(geometry, B_from_home * home_from_P) *
+  return actuated_jacobian(geometry, B_from_home * home_from_P) *
          product_jacobian_right(B_from_home, home_from_P) * product_jacobian_left(home_from_LG, LG_from_P) *
          pose_parameters_jacobian(pose).inverse();
 }

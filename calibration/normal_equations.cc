@@ -7,6 +7,10 @@
 namespace hexcal {
 namespace {
 
+// Up to six equations per pose, on the stack.
+using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
+using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
+
 Vector6d noise_factors(const NoiseModel& noise) {
   Vector6d factors;
   factors << Eigen::Vector3d::Constant(noise.position_factor),
@@ -16,19 +20,17 @@ Vector6d noise_factors(const NoiseModel& noise) {
 
 // A covariance may be singular, and is zero for the defining home pose: a part of the legs' own noise that no
 // measurement resolves keeps its Cholesky factor alive.
-void add_leg_noise(Eigen::MatrixXd& covariance, const NoiseModel& noise) {
+double leg_variance(const NoiseModel& noise) {
   constexpr double kFloorMm = 1e-9;
-  const double variance = std::max(noise.leg_sigma_mm * noise.leg_sigma_mm, kFloorMm * kFloorMm);
-  covariance.diagonal().array() += variance;
+  return std::max(noise.leg_sigma_mm * noise.leg_sigma_mm, kFloorMm * kFloorMm);
 }
 
+// Of whitened quantities; factor * factor^T is the component's covariance.
 void add_component(NormalEquations::Component& component, const Eigen::MatrixXd& factor,
-                   const Eigen::LLT<Eigen::MatrixXd>& llt, const Eigen::VectorXd& residuals,
-                   const Eigen::MatrixXd& jacobian, double weight) {
-  const Eigen::MatrixXd white_factor = llt.matrixL().solve(factor);
-  const Eigen::MatrixXd projected = white_factor.transpose() * jacobian;
-  component.quadratic += (white_factor.transpose() * residuals).squaredNorm();
-  component.trace += weight * white_factor.squaredNorm();
+                   const Eigen::VectorXd& residuals, const Eigen::MatrixXd& jacobian, double weight) {
+  const Eigen::MatrixXd projected = factor.transpose() * jacobian;
+  component.quadratic += (factor.transpose() * residuals).squaredNorm();
+  component.trace += weight * factor.squaredNorm();
   component.information.selfadjointView<Eigen::Lower>().rankUpdate(projected.transpose());
 }
 
@@ -84,50 +86,40 @@ NormalEquations normal_equations(const std::vector<ReducedPose>& reduced, const 
   sums.squares_of_pose.resize(reduced.size());
   const bool joint = observations.joint_covariance.size() > 0;
 
-  const auto add = [&](Eigen::VectorXd residuals, Eigen::MatrixXd jacobian, const Eigen::MatrixXd& covariance,
-                       double weight) {
-    const Eigen::LLT<Eigen::MatrixXd> llt(covariance);
-    llt.matrixL().solveInPlace(residuals);
-    llt.matrixL().solveInPlace(jacobian);
-    sums.information.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose());
-    sums.gradient.noalias() += jacobian.transpose() * residuals;
-    sums.squares += residuals.squaredNorm();
-    if (request.components) {
-      const Eigen::Index m = residuals.size();
-      add_component(sums.leg, noise.leg_sigma_mm * Eigen::MatrixXd::Identity(m, m), llt, residuals, jacobian,
-                    weight);
-    }
-    return llt;
-  };
-
   Eigen::Index rows = 0;
+  Eigen::MatrixXd white;
   for (std::size_t i = 0; i < reduced.size(); ++i) {
     const ReducedPose& pose = reduced[i];
+    const Eigen::Index m = pose.residuals.size();
     const double root = std::sqrt(weights[i]);
-    Eigen::MatrixXd covariance =
-        pose.by_pose * pose_covariance(observations, i, noise) * pose.by_pose.transpose();
-    add_leg_noise(covariance, noise);
-    rows += pose.residuals.size();
-    sums.rows += weights[i] * static_cast<double>(pose.residuals.size());
-    sums.squares_of_pose[i] =
-        pose.residuals.dot(Eigen::LLT<Eigen::MatrixXd>(covariance).solve(pose.residuals));
-    if (request.information_of_pose) {
-      const Eigen::LLT<Eigen::MatrixXd> llt(covariance);
-      const Eigen::MatrixXd white = llt.matrixL().solve(pose.jacobian);
+    const Matrix6d noise_of_pose = pose_covariance(observations, i, noise);
+    SmallMatrix covariance = pose.by_pose * noise_of_pose * pose.by_pose.transpose();
+    covariance.diagonal().array() += leg_variance(noise);
+    const Eigen::LLT<SmallMatrix> llt(covariance);
+    const SmallVector white_residuals = llt.matrixL().solve(SmallVector(pose.residuals));
+    rows += m;
+    sums.rows += weights[i] * static_cast<double>(m);
+    sums.squares_of_pose[i] = white_residuals.squaredNorm();
+    if (joint && !request.information_of_pose) continue;
+    white = pose.jacobian;
+    llt.matrixL().solveInPlace(white);
+    if (request.information_of_pose)
       sums.information_of_pose.push_back(weights[i] * white.transpose() * white);
-    }
     if (joint) continue;
-    const auto llt = add(root * pose.residuals, root * pose.jacobian, covariance, weights[i]);
-    if (request.components && !observations.covariance_known) {
-      const Eigen::MatrixXd root_covariance =
-          pose.by_pose *
-          Eigen::MatrixXd(pose_covariance(observations, i, noise).diagonal().cwiseSqrt().asDiagonal());
-      Eigen::VectorXd white_residuals = llt.matrixL().solve(root * pose.residuals);
-      Eigen::MatrixXd white_jacobian = llt.matrixL().solve(root * pose.jacobian);
-      add_component(sums.position, root_covariance.leftCols(3), llt, white_residuals, white_jacobian,
-                    weights[i]);
-      add_component(sums.orientation, root_covariance.rightCols(3), llt, white_residuals, white_jacobian,
-                    weights[i]);
+    sums.information.selfadjointView<Eigen::Lower>().rankUpdate(white.transpose(), weights[i]);
+    sums.gradient.noalias() += weights[i] * white.transpose() * white_residuals;
+    sums.squares += weights[i] * white_residuals.squaredNorm();
+    if (!request.components) continue;
+    const auto component_of = [&](NormalEquations::Component& component, const SmallMatrix& factor) {
+      const SmallMatrix white_factor = llt.matrixL().solve(factor);
+      add_component(component, white_factor, root * white_residuals, root * white, weights[i]);
+    };
+    if (observations.covariance_known) {
+      component_of(sums.leg, noise.leg_sigma_mm * SmallMatrix::Identity(m, m));
+    } else {
+      const SmallMatrix by_sigma = pose.by_pose * noise_of_pose.diagonal().cwiseSqrt().asDiagonal();
+      component_of(sums.position, by_sigma.leftCols(3));
+      component_of(sums.orientation, by_sigma.rightCols(3));
     }
   }
   if (joint) {
@@ -148,8 +140,18 @@ NormalEquations normal_equations(const std::vector<ReducedPose>& reduced, const 
       at += m;
     }
     Eigen::MatrixXd covariance = by_pose * observations.joint_covariance * by_pose.transpose();
-    add_leg_noise(covariance, noise);
-    add(std::move(residuals), std::move(jacobian), covariance, mean_weight);
+    covariance.diagonal().array() += leg_variance(noise);
+    const Eigen::LLT<Eigen::MatrixXd> llt(covariance);
+    llt.matrixL().solveInPlace(residuals);
+    llt.matrixL().solveInPlace(jacobian);
+    sums.information.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose());
+    sums.gradient = jacobian.transpose() * residuals;
+    sums.squares = residuals.squaredNorm();
+    if (request.components) {
+      const Eigen::MatrixXd factor =
+          llt.matrixL().solve(noise.leg_sigma_mm * Eigen::MatrixXd::Identity(rows, rows));
+      add_component(sums.leg, factor, residuals, jacobian, mean_weight);
+    }
   }
   const Eigen::MatrixXd lower = sums.information;
   sums.information = lower.selfadjointView<Eigen::Lower>();

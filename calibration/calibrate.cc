@@ -1,0 +1,176 @@
+#include "calibration/calibrate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "kinematics/geometry/input_error.h"
+
+namespace hexcal {
+namespace {
+
+constexpr std::size_t kFewestPoses = 4;
+
+bool kinematic_family(const CrossValidation& method) {
+  return method.method == CompensationMethod::kinematic;
+}
+
+// The member of the wanted family with the least cross-validated error; extensions must earn their place.
+std::size_t choose_within(const MethodComparison& comparison, const std::string& wanted) {
+  const auto& methods = comparison.methods;
+  std::size_t chosen = methods.size();
+  for (std::size_t i = 0; i < methods.size(); ++i) {
+    const bool exact = methods[i].name == wanted;
+    const bool extension = wanted == "kinematic" && methods[i].name.rfind("kinematic +", 0) == 0;
+    if (!(exact || extension) || !methods[i].failure.empty()) continue;
+    if (chosen == methods.size()) {
+      chosen = i;
+      continue;
+    }
+    double gain = 0;
+    double squares = 0;
+    const double n = static_cast<double>(methods[i].losses_mm2.size());
+    for (std::size_t p = 0; p < methods[i].losses_mm2.size(); ++p) {
+      const double d = methods[chosen].losses_mm2[p] - methods[i].losses_mm2[p];
+      gain += d / n;
+      squares += d * d / n;
+    }
+    const double error = n > 1 ? std::sqrt(std::max(0.0, squares - gain * gain) / (n - 1)) : 0.0;
+    if (gain > error) chosen = i;
+  }
+  return chosen;
+}
+
+std::vector<PaperEvaluation> evaluate_methods(const ObservationSet& observations,
+                                              const MethodComparison& comparison,
+                                              const std::vector<Candidate>& candidates,
+                                              const PlatformGeometry& nominal, const ObservationSet& seen) {
+  std::vector<PaperEvaluation> evaluations;
+  std::vector<Target> targets;
+  std::map<std::string, std::size_t> index;
+  for (std::size_t i = 0; i < observations.poses.size(); ++i) {
+    const PoseObservation& pose = observations.poses[i];
+    index[pose.id] = i;
+    if (pose.target && !pose.is_definition && pose.complete()) targets.push_back({pose.id, *pose.target});
+  }
+  for (std::size_t m = 0; m < comparison.methods.size(); ++m) {
+    const CrossValidation& method = comparison.methods[m];
+    PaperEvaluation evaluation;
+    evaluation.method = method.name;
+    std::string ignored;
+    const bool paper_options_see = method.method != CompensationMethod::kinematic;
+    const auto fitted =
+        fit_candidate(nominal, paper_options_see ? seen : observations, candidates[m], &ignored);
+    std::map<std::size_t, Vector6d> after;
+    for (std::size_t p = 0; p < method.held_out.size(); ++p)
+      after[method.held_out_index[p]] = pose_error(method.held_out[p].actual, method.held_out[p].target);
+    std::vector<PosePair> before_pairs;
+    std::vector<PosePair> after_pairs;
+    if (fitted && method.failure.empty()) {
+      for (const CorrectedCommand& command : compensate(fitted->model, targets)) {
+        if (command.status != CommandStatus::ok) {
+          evaluation.dropped.push_back(command.id);
+          continue;
+        }
+        const std::size_t i = index.at(command.id);
+        if (after.count(i) == 0) continue;
+        evaluation.valid.push_back(command.id);
+        before_pairs.push_back({command.target, seen.poses[i].measured});
+        evaluation.errors_before.push_back(pose_error(seen.poses[i].measured, command.target));
+        evaluation.errors_after.push_back(after.at(i));
+        for (std::size_t p = 0; p < method.held_out.size(); ++p)
+          if (method.held_out_index[p] == i) after_pairs.push_back(method.held_out[p]);
+      }
+    }
+    evaluation.before = error_statistics(before_pairs);
+    evaluation.after = error_statistics(after_pairs);
+    evaluations.push_back(std::move(evaluation));
+  }
+  return evaluations;
+}
+
+void require_poses(const ObservationSet& observations) {
+  std::size_t count = 0;
+  double spread = 0;
+  for (const PoseObservation& pose : observations.poses) {
+    if (pose.is_definition) continue;
+    ++count;
+    spread = std::max(spread, (pose.readings - observations.poses.front().readings).cwiseAbs().maxCoeff());
+  }
+  if (count < kFewestPoses)
+    throw InputError(
+        fmt::format("{} measured poses besides home, wanted at least {} (34 are usual, 12 planned "
+                    "ones may do)",
+                    count, kFewestPoses));
+  if (spread == 0) throw InputError("all measured poses have the same readings, wanted different poses");
+}
+
+}  // namespace
+
+CalibrationReport calibrate(const PlatformGeometry& nominal, const ObservationSet& observations,
+                            const CalibrateOptions& options) {
+  require_poses(observations);
+  CalibrationReport report;
+  const bool frames_unknown = options.identify.frames_unknown;
+
+  std::vector<std::size_t> kept;
+  std::vector<std::size_t> out;
+  if (!frames_unknown) out = near_singular_outliers(nominal, observations.poses);
+  for (std::size_t i = 0; i < observations.poses.size(); ++i) {
+    if (std::find(out.begin(), out.end(), i) == out.end()) {
+      kept.push_back(i);
+    } else {
+      report.outliers.push_back(observations.poses[i].id);
+    }
+  }
+  const ObservationSet used = out.empty() ? observations : observations.subset(kept);
+
+  // With frames that the measurement does not share with the hexapod, errors exist only after alignment.
+  ObservationSet seen = used;
+  if (frames_unknown) {
+    const IdentifyResult aligned = identify(nominal, used, options.identify);
+    if (aligned.status != IdentifyStatus::identified) throw InputError(aligned.reason);
+    seen = in_hexapod_frames(nominal, used, aligned);
+  }
+  std::vector<PosePair> pairs;
+  const ObservationSet& listed = frames_unknown ? seen : observations;
+  for (const PoseObservation& pose : listed.poses) {
+    if (!pose.target || pose.is_definition || !pose.complete()) continue;
+    report.pose_ids.push_back(pose.id);
+    report.errors.push_back(pose_error(pose.measured, *pose.target));
+    const bool outlier =
+        std::find(report.outliers.begin(), report.outliers.end(), pose.id) != report.outliers.end();
+    if (!outlier) pairs.push_back({*pose.target, pose.measured});
+  }
+  if (!pairs.empty()) report.uncompensated = error_statistics(pairs);
+
+  const std::vector<Candidate> candidates = candidates_for(used, options.identify);
+  report.comparison = compare_methods(nominal, used, candidates, options.comparison);
+  if (!pairs.empty())
+    report.evaluations = evaluate_methods(used, report.comparison, candidates, nominal, seen);
+
+  std::size_t chosen = report.comparison.chosen;
+  report.why = report.comparison.why;
+  if (options.method != "auto") {
+    chosen = choose_within(report.comparison, options.method);
+    if (chosen == candidates.size())
+      throw InputError(fmt::format("method {}: cannot be fitted to these poses", options.method));
+    report.why = candidates[chosen].name == options.method
+                     ? fmt::format("{}: as asked", options.method)
+                     : fmt::format("{}: as asked, and cross-validation says that the extension helps",
+                                   candidates[chosen].name);
+  }
+  report.chosen = candidates[chosen].name;
+  std::string reason;
+  const bool kinematic = kinematic_family(report.comparison.methods[chosen]);
+  auto fitted = fit_candidate(nominal, kinematic ? used : seen, candidates[chosen], &reason);
+  if (!fitted) throw InputError(fmt::format("method {}: {}", report.chosen, reason));
+  report.fitted = std::move(*fitted);
+  if (report.fitted.identified)
+    report.identifiability = judge_identifiability(nominal, *report.fitted.identified);
+  return report;
+}
+
+}  // namespace hexcal

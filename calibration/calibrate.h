@@ -1,0 +1,52 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/identifiability.h"
+#include "calibration/method_comparison.h"
+
+namespace hexcal {
+
+struct CalibrateOptions {
+  /// "auto", "option1", "option2", "option3", "kinematic" (extensions by cross-validation) or the exact name
+  /// of a candidate.
+  std::string method = "auto";
+  IdentifyOptions identify;
+  ComparisonOptions comparison;
+};
+
+/// The paper's evaluation of one option for the user's campaign (tables 2 to 4, figures 11 to 16). "After" is
+/// what cross-validation expects to remain; measured poses after compensation are evaluated by
+/// error_statistics.
+struct PaperEvaluation {
+  std::string method;
+  std::vector<std::string> valid;       ///< pose ids whose corrected command is in the workspace
+  std::vector<std::string> dropped;     ///< and those that fall out of it
+  ErrorStatistics before;               ///< over `valid`, as the paper should have done
+  ErrorStatistics after;                ///< over `valid`
+  std::vector<Vector6d> errors_before;  ///< of `valid`: figures 12, 14, 16
+  std::vector<Vector6d> errors_after;
+};
+
+struct CalibrationReport {
+  std::vector<std::string> outliers;             ///< the paper's near-singular rule: out for all methods
+  std::vector<std::string> pose_ids;             ///< poses with a target, outliers included
+  std::vector<Vector6d> errors;                  ///< measured minus target: figure 9
+  std::optional<ErrorStatistics> uncompensated;  ///< without outliers: figure 10; nothing without targets
+  MethodComparison comparison;
+  std::vector<PaperEvaluation> evaluations;  ///< in the order of comparison.methods; empty without targets
+  std::string chosen;                        ///< name of the candidate
+  std::string why;
+  FittedMethod fitted;                             ///< the chosen method, fitted to all poses
+  std::optional<Identifiability> identifiability;  ///< when that is kinematic
+};
+
+/// From observations to a model: outliers out, all methods side by side by cross-validation, the wanted or
+/// the best one fitted to everything. Throws InputError when the poses cannot carry any model (fewer than 4,
+/// all at one place) or the wanted one.
+[[nodiscard]] CalibrationReport calibrate(const PlatformGeometry& nominal, const ObservationSet& observations,
+                                          const CalibrateOptions& options = {});
+
+}  // namespace hexcal

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/compensation.h"
+#include "calibration/statistics.h"
+
+namespace hexcal {
+
+/// A way to compensate that can be fitted to a set of observations.
+struct Candidate {
+  std::string name;  ///< "option3", "kinematic", "kinematic + curves", ...
+  CompensationMethod method = CompensationMethod::nominal;
+  IdentifyOptions identify;  ///< of kinematic
+  int complexity = 0;        ///< how many numbers it has: the order of simplicity
+};
+
+/// The paper's options and the kinematic models that the data can bear, in order of complexity. Kinematic
+/// models: leg offsets only, with scales, with joints, with curves along the stroke, with sag, and with
+/// backlash where approach directions are known.
+[[nodiscard]] std::vector<Candidate> candidates_for(const ObservationSet& observations,
+                                                    const IdentifyOptions& base);
+
+struct FittedMethod {
+  CalibrationModel model;
+  std::optional<IdentifyResult> identified;
+};
+
+/// Nothing when the method cannot be fitted to these observations; `reason` then says why.
+[[nodiscard]] std::optional<FittedMethod> fit_candidate(const PlatformGeometry& nominal,
+                                                        const ObservationSet& observations,
+                                                        const Candidate& candidate, std::string* reason);
+
+/// How well one candidate compensates poses that it has not seen.
+struct CrossValidation {
+  std::string name;
+  CompensationMethod method = CompensationMethod::nominal;
+  int complexity = 0;
+  std::string failure;     ///< why there is no result; else empty
+  int poses = 0;           ///< held out, each once
+  ErrorStatistics errors;  ///< that would remain after compensation, with the measurement's noise in them
+  double position_rms_se_mm = 0;  ///< standard errors of the rms values
+  double orientation_rms_se_rad = 0;
+  int targets_lost = 0;  ///< targets whose corrected command breaks a limit
+  /// Squared error of each pose, mm^2, rotations as arcs at the characteristic length; in pose order.
+  std::vector<double> losses_mm2;
+  std::vector<PosePair> held_out;  ///< target: modelled, actual: measured
+  std::vector<std::size_t> held_out_index;
+  double mean_loss_mm2() const;
+};
+
+struct ComparisonOptions {
+  int leave_one_out_up_to = 40;  ///< poses; more are held out in folds
+  int folds = 10;
+};
+
+struct MethodComparison {
+  bool leave_one_out = false;
+  int folds = 0;
+  std::vector<CrossValidation> methods;
+  std::size_t best = 0;    ///< least loss
+  std::size_t chosen = 0;  ///< the simplest within one standard error of the best
+  std::string why;         ///< one line
+};
+
+/// Cross-validates all candidates over the same folds. The error that would remain at a held-out pose is the
+/// difference between the pose that the fitted model expects at the readings used and the pose measured: with
+/// the measured pose as a target, the model would have been wrong by that. The choice compares losses
+/// pairwise over poses (one-standard-error rule of Breiman et al. 1984 on the differences).
+[[nodiscard]] MethodComparison compare_methods(const PlatformGeometry& nominal,
+                                               const ObservationSet& observations,
+                                               const std::vector<Candidate>& candidates,
+                                               const ComparisonOptions& options = {});
+
+/// The observations as the hexapod's own frames see them, by an identification with unknown frames.
+[[nodiscard]] ObservationSet in_hexapod_frames(const PlatformGeometry& nominal,
+                                               const ObservationSet& observations,
+                                               const IdentifyResult& identified);
+
+}  // namespace hexcal

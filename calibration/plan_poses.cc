@@ -1,0 +1,237 @@
+#include "calibration/plan_poses.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "calibration/leg_residuals.h"
+#include "calibration/normal_equations.h"
+#include "kinematics/geometry/input_error.h"
+#include "kinematics/inverse.h"
+
+namespace hexcal {
+namespace {
+
+using Whitened = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+
+// Whitened Jacobians of poses by the free parameters, these in units of their tolerances.
+class Design {
+ public:
+  Design(const PlatformGeometry& nominal, const PlanOptions& options) : nominal_(nominal), options_(options) {
+    // Layout, selection and tolerances are those that identification itself would use: it is asked with one
+    // perfect pose.
+    ObservationSet one;
+    PoseObservation home;
+    home.readings = readings_at(nominal, nominal.home_B_from_P());
+    home.target = Pose{};
+    home.covariance = variance().asDiagonal();
+    one.poses.push_back(home);
+    IdentifyOptions identify_options = options.identify;
+    identify_options.frames_unknown = false;
+    identify_options.adapt_tolerances = false;
+    identified_ = identify(nominal, one, identify_options);
+    for (Eigen::Index k = 0; k < 6; ++k) {
+      const Actuator& actuator = nominal.actuators[static_cast<std::size_t>(k)];
+      const double a = (actuator.min_mm - actuator.offset_mm) / actuator.mm_per_unit;
+      const double b = (actuator.max_mm - actuator.offset_mm) / actuator.mm_per_unit;
+      identified_.stroke_range.row(k) << std::min(a, b), std::max(a, b);
+    }
+  }
+
+  Eigen::Index parameters() const { return identified_.selection.free_count; }
+
+  Whitened measured(const Pose& pose) const {
+    const auto [reduced, by_pose] = reduced_at(pose);
+    Matrix6d covariance = by_pose * variance().asDiagonal() * by_pose.transpose();
+    covariance.diagonal().array() += options_.identify.leg_sigma_mm * options_.identify.leg_sigma_mm;
+    return Eigen::LLT<Matrix6d>(covariance).matrixL().solve(reduced);
+  }
+
+  // Jacobian of the pose (mm and rad) by the parameters.
+  Whitened pose_error(const Pose& pose) const {
+    const auto [reduced, by_pose] = reduced_at(pose);
+    return by_pose.partialPivLu().solve(reduced);
+  }
+
+ private:
+  Vector6d variance() const {
+    Vector6d v;
+    const double rad = options_.orientation_sigma_deg * kRadPerDeg;
+    v << Eigen::Vector3d::Constant(options_.position_sigma_mm * options_.position_sigma_mm),
+        Eigen::Vector3d::Constant(rad * rad);
+    return v;
+  }
+
+  std::pair<Whitened, Matrix6d> reduced_at(const Pose& pose) const {
+    const MachineModel machine{.geometry = nominal_};
+    const LegLinearization legs =
+        linearize_legs(machine, machine, identified_.layout, identified_.stroke_range, pose,
+                       machine_readings(machine, pose), LegVector::Zero());
+    ReducedPose reduced =
+        reduce_to_observed(legs, {true, true, true, true, true, true}, identified_.selection);
+    reduced.jacobian *= identified_.tolerances.asDiagonal();
+    return {reduced.jacobian, legs.by_pose};
+  }
+
+  const PlatformGeometry& nominal_;
+  const PlanOptions& options_;
+  IdentifyResult identified_;
+};
+
+Eigen::MatrixXd covariance_of(const std::vector<Whitened>& design, const std::vector<std::size_t>& chosen,
+                              Eigen::Index parameters) {
+  Eigen::MatrixXd information = Eigen::MatrixXd::Identity(parameters, parameters);
+  for (const std::size_t i : chosen) information.noalias() += design[i].transpose() * design[i];
+  return information.llt().solve(Eigen::MatrixXd::Identity(parameters, parameters));
+}
+
+// What adding (sign +1) or removing (-1) a pose does to the criterion; larger is better.
+class Criterion {
+ public:
+  Criterion(PlanCriterion kind, const Eigen::MatrixXd& interest) : kind_(kind), interest_(interest) {}
+
+  double gain(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& weighted, const Whitened& pose,
+              double sign) const {
+    const Eigen::Matrix<double, Eigen::Dynamic, 6> spread = covariance * pose.transpose();
+    const Matrix6d inner = Matrix6d::Identity() + sign * pose * spread;
+    const Eigen::LLT<Matrix6d> llt(inner);
+    if (llt.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
+    if (kind_ == PlanCriterion::d_optimal)
+      return 2.0 * Matrix6d(llt.matrixL()).diagonal().array().log().sum();
+    // trace(B S) falls by trace(spread^T B spread inner^-1), with weighted = covariance B covariance.
+    const Matrix6d through = pose * weighted * pose.transpose();
+    return sign * llt.solve(through).trace();
+  }
+
+  Eigen::MatrixXd weighted(const Eigen::MatrixXd& covariance) const {
+    return kind_ == PlanCriterion::d_optimal ? Eigen::MatrixXd()
+                                             : Eigen::MatrixXd(covariance * interest_ * covariance);
+  }
+
+ private:
+  PlanCriterion kind_;
+  const Eigen::MatrixXd& interest_;
+};
+
+PredictedError predict(const std::vector<Whitened>& errors, const Eigen::MatrixXd& covariance,
+                       std::size_t poses) {
+  PredictedError predicted;
+  predicted.poses = poses;
+  for (const Whitened& j : errors) {
+    const Matrix6d c = j * covariance * j.transpose();
+    predicted.position_mm += c.diagonal().head<3>().sum();
+    predicted.orientation_rad += c.diagonal().tail<3>().sum();
+  }
+  const double n = std::max<double>(1.0, static_cast<double>(errors.size()));
+  predicted.position_mm = std::sqrt(predicted.position_mm / n);
+  predicted.orientation_rad = std::sqrt(predicted.orientation_rad / n);
+  return predicted;
+}
+
+}  // namespace
+
+void PlanOptions::validate() const {
+  const auto positive = [](double value, const char* field) {
+    if (!(value > 0)) throw InputError(fmt::format("{}: found {}, wanted more than 0", field, value));
+  };
+  positive(static_cast<double>(count), "count");
+  positive(position_sigma_mm, "position_sigma_mm");
+  positive(orientation_sigma_deg, "orientation_sigma_deg");
+  identify.validate();
+}
+
+PosePlan plan_poses(const PlatformGeometry& nominal, const std::vector<Pose>& candidates,
+                    const std::vector<Pose>& load_paths, const PlanOptions& options) {
+  options.validate();
+  if (candidates.size() < options.count)
+    throw InputError(fmt::format("{} candidate poses, wanted at least the {} to choose", candidates.size(),
+                                 options.count));
+  const Design design(nominal, options);
+  std::vector<Whitened> measured;
+  for (const Pose& pose : candidates) measured.push_back(design.measured(pose));
+  std::vector<Whitened> errors;
+  constexpr std::size_t kMostEvaluated = 200;
+  const std::vector<Pose>& where = load_paths.empty() ? candidates : load_paths;
+  const std::size_t stride = std::max<std::size_t>(1, where.size() / kMostEvaluated);
+  for (std::size_t i = 0; i < where.size(); i += stride) errors.push_back(design.pose_error(where[i]));
+  // Rotations count as arcs at the platform's size.
+  const double length = characteristic_length_mm(nominal);
+  Eigen::MatrixXd interest = Eigen::MatrixXd::Zero(design.parameters(), design.parameters());
+  for (const Whitened& j : errors) {
+    Whitened weighed = j;
+    weighed.bottomRows<3>() *= length;
+    interest.noalias() += weighed.transpose() * weighed / static_cast<double>(errors.size());
+  }
+  const Criterion criterion(options.criterion, interest);
+
+  PosePlan plan;
+  Eigen::MatrixXd covariance = covariance_of(measured, {}, design.parameters());
+  const auto best_addition = [&](const std::vector<std::size_t>& taken) {
+    const Eigen::MatrixXd weighted = criterion.weighted(covariance);
+    std::size_t best = 0;
+    double most = -std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < measured.size(); ++i) {
+      if (std::find(taken.begin(), taken.end(), i) != taken.end()) continue;
+      const double gain = criterion.gain(covariance, weighted, measured[i], 1.0);
+      if (gain > most) {
+        most = gain;
+        best = i;
+      }
+    }
+    return std::pair(best, most);
+  };
+  while (plan.chosen.size() < options.count) {
+    plan.chosen.push_back(best_addition(plan.chosen).first);
+    covariance = covariance_of(measured, plan.chosen, design.parameters());
+  }
+  // Exchange: the pose that is missed least goes, the one that helps most comes.
+  for (plan.exchanges = 0; plan.exchanges < options.max_exchanges; ++plan.exchanges) {
+    const Eigen::MatrixXd weighted = criterion.weighted(covariance);
+    std::size_t least = 0;
+    double loss = -std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < plan.chosen.size(); ++k) {
+      const double change = criterion.gain(covariance, weighted, measured[plan.chosen[k]], -1.0);
+      if (change > loss) {
+        loss = change;
+        least = k;
+      }
+    }
+    std::vector<std::size_t> others = plan.chosen;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(least));
+    covariance = covariance_of(measured, others, design.parameters());
+    const auto [best, gain] = best_addition(others);
+    const bool same = best == plan.chosen[least] || gain + loss <= 1e-9 * std::abs(gain);
+    if (!same) {
+      others.push_back(best);
+      plan.chosen = others;
+    }
+    covariance = covariance_of(measured, plan.chosen, design.parameters());
+    if (same) break;
+  }
+  // In the order in which they help, so that one may stop early.
+  std::vector<std::size_t> pool = plan.chosen;
+  plan.chosen.clear();
+  covariance = covariance_of(measured, {}, design.parameters());
+  while (!pool.empty()) {
+    const Eigen::MatrixXd weighted = criterion.weighted(covariance);
+    const auto best = std::max_element(pool.begin(), pool.end(), [&](std::size_t a, std::size_t b) {
+      return criterion.gain(covariance, weighted, measured[a], 1.0) <
+             criterion.gain(covariance, weighted, measured[b], 1.0);
+    });
+    plan.chosen.push_back(*best);
+    pool.erase(best);
+    covariance = covariance_of(measured, plan.chosen, design.parameters());
+    plan.by_count.push_back(predict(errors, covariance, plan.chosen.size()));
+    std::vector<std::size_t> random(plan.chosen.size());
+    for (std::size_t i = 0; i < random.size(); ++i) random[i] = i;
+    plan.random_by_count.push_back(
+        predict(errors, covariance_of(measured, random, design.parameters()), random.size()));
+  }
+  return plan;
+}
+
+}  // namespace hexcal

@@ -1,0 +1,165 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "calibration/plan_poses.h"
+#include "kinematics/geometry/input_error.h"
+#include "kinematics/sampling.h"
+#include "tools/hexcal/command.h"
+#include "tools/hexcal/terminal.h"
+#include "tools/hexcal/version.h"
+#include "tools/io/atomic_file.h"
+#include "tools/io/campaign_file.h"
+#include "tools/io/hexapod_file.h"
+#include "tools/io/pose_table.h"
+
+namespace hexcal {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Flags {
+  fs::path campaign, hexapod, candidates, load_paths, out;
+  std::size_t count = 12;
+  std::string criterion = "d";
+  double position_sigma_mm = 0.05;
+  double orientation_sigma_deg = 0.02;
+  double max_tilt_deg = 180;
+  std::uint64_t seed = 1;
+  bool json = false;
+};
+
+std::vector<Pose> poses_of(const fs::path& path, std::vector<std::string>* ids = nullptr) {
+  std::vector<Pose> poses;
+  for (const PoseRecord& record : read_pose_table(path)) {
+    if (!record.pose) continue;
+    poses.push_back(*record.pose);
+    if (ids != nullptr) ids->push_back(record.id);
+  }
+  return poses;
+}
+
+// Angle by which a pose tips the markers away from where they look at home.
+double tilt_deg(const Pose& pose) {
+  const Eigen::Vector3d z = quaternion_from_rpy(pose.rpy_rad) * Eigen::Vector3d::UnitZ();
+  return std::atan2(z.head<2>().norm(), z.z()) * kDegPerRad;
+}
+
+int run(Flags flags) {
+  constexpr std::size_t kCandidates = 2000;
+  if (!flags.campaign.empty()) {
+    const Campaign campaign = read_campaign(flags.campaign);
+    if (flags.hexapod.empty() && campaign.hexapod) flags.hexapod = *campaign.hexapod;
+  }
+  if (flags.hexapod.empty())
+    throw InputError("--hexapod: missing, wanted hexapod.yaml or a campaign that names it");
+  const PlatformGeometry nominal = read_hexapod_file(flags.hexapod);
+
+  std::vector<std::string> ids;
+  std::vector<Pose> candidates;
+  if (flags.candidates.empty()) {
+    SampleOptions sampling;
+    sampling.count = kCandidates;
+    sampling.seed = flags.seed;
+    candidates = sample_poses(nominal, sampling).poses;
+  } else {
+    candidates = poses_of(flags.candidates, &ids);
+  }
+  for (std::size_t i = candidates.size(); i-- > 0;) {
+    if (tilt_deg(candidates[i]) <= flags.max_tilt_deg) continue;
+    candidates.erase(candidates.begin() + static_cast<std::ptrdiff_t>(i));
+    if (!ids.empty()) ids.erase(ids.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  std::vector<Pose> load_paths;
+  if (!flags.load_paths.empty()) {
+    load_paths = poses_of(flags.load_paths);
+  } else if (flags.criterion == "i") {
+    SampleOptions sampling;
+    sampling.count = 100;
+    sampling.kind = SampleKind::load_paths;
+    load_paths = sample_poses(nominal, sampling).poses;
+  }
+  PlanOptions options;
+  options.count = flags.count;
+  options.criterion = flags.criterion == "i" ? PlanCriterion::i_optimal : PlanCriterion::d_optimal;
+  options.position_sigma_mm = flags.position_sigma_mm;
+  options.orientation_sigma_deg = flags.orientation_sigma_deg;
+  const PosePlan plan = plan_poses(nominal, candidates, load_paths, options);
+
+  std::vector<PoseRecord> records;
+  for (std::size_t i = 0; i < plan.chosen.size(); ++i) {
+    PoseRecord record;
+    record.id = ids.empty() ? fmt::format("p{:02}", i + 1) : ids[plan.chosen[i]];
+    record.pose = candidates[plan.chosen[i]];
+    records.push_back(record);
+  }
+  std::vector<fs::path> inputs{flags.hexapod};
+  if (!flags.candidates.empty()) inputs.push_back(flags.candidates);
+  if (!flags.load_paths.empty()) inputs.push_back(flags.load_paths);
+  write_file_atomically(
+      flags.out, format_pose_table(provenance_line(kVersion, "plan", inputs), records, PoseColumns::target));
+  if (flags.json) {
+    nlohmann::ordered_json out{{"written", flags.out.string()}, {"exchanges", plan.exchanges}};
+    for (const PoseRecord& record : records) out["poses"].push_back(record.id);
+    for (std::size_t i = 0; i < plan.by_count.size(); ++i) {
+      out["predicted"].push_back({{"poses", plan.by_count[i].poses},
+                                  {"position_mm", plan.by_count[i].position_mm},
+                                  {"orientation_deg", plan.by_count[i].orientation_rad * kDegPerRad},
+                                  {"unplanned_position_mm", plan.random_by_count[i].position_mm}});
+    }
+    fmt::print("{}\n", out.dump(2));
+    return kDone;
+  }
+  TextTable table({"poses", "planned_mm", "planned_deg", "unplanned_mm", "unplanned_deg"});
+  for (std::size_t i = 0; i < plan.by_count.size(); ++i) {
+    const PredictedError& planned = plan.by_count[i];
+    const PredictedError& random = plan.random_by_count[i];
+    table.add_row({std::to_string(planned.poses), fmt::format("{:.4f}", planned.position_mm),
+                   fmt::format("{:.4f}", planned.orientation_rad * kDegPerRad),
+                   fmt::format("{:.4f}", random.position_mm),
+                   fmt::format("{:.4f}", random.orientation_rad * kDegPerRad)});
+  }
+  fmt::print("predicted error that remains after compensation, for poses measured to {} mm and {} deg\n{}",
+             flags.position_sigma_mm, flags.orientation_sigma_deg, table.text());
+  fmt::print("wrote {} poses of {} candidates to {}\n", records.size(), candidates.size(),
+             flags.out.string());
+  return kDone;
+}
+
+}  // namespace
+
+void add_plan_command(CLI::App& app, Action& action) {
+  const auto flags = std::make_shared<Flags>();
+  CLI::App* command = app.add_subcommand("plan", "Choose the poses that identify the machine best");
+  command->add_option("campaign", flags->campaign, "campaign folder that names hexapod.yaml");
+  command->add_option("--hexapod", flags->hexapod, "nominal geometry (hexapod.yaml)");
+  command->add_option("-n,--poses", flags->count, "number of poses")->capture_default_str();
+  command
+      ->add_option("--criterion", flags->criterion, "d: best parameters; i: least error along the load paths")
+      ->check(CLI::IsMember({"d", "i"}))
+      ->capture_default_str();
+  command->add_option("--load-paths", flags->load_paths,
+                      "poses at which the error matters (default: tension, compression, torsion, bending)");
+  command->add_option("--candidates", flags->candidates, "choose among these poses instead of the workspace");
+  command
+      ->add_option("--max-tilt-deg", flags->max_tilt_deg,
+                   "tilt up to which the cameras see the moving markers")
+      ->capture_default_str();
+  command->add_option("--sigma-mm", flags->position_sigma_mm, "noise of measured positions")
+      ->capture_default_str();
+  command->add_option("--sigma-deg", flags->orientation_sigma_deg, "noise of measured angles")
+      ->capture_default_str();
+  command->add_option("--seed", flags->seed, "of the candidates")->capture_default_str();
+  command->add_option("-o,--out", flags->out, "targets.csv to write")->required();
+  command->add_flag("--json", flags->json, "machine-readable output");
+  command->footer(
+      "Prints the predicted remaining error against the number of poses, to know when to stop. Sample "
+      "output:\n"
+      "  poses  planned_mm  planned_deg  unplanned_mm  unplanned_deg\n"
+      "  12         0.0412       0.0134        0.0920         0.0281");
+  command->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+}
+
+}  // namespace hexcal

@@ -1,0 +1,237 @@
+#include "tools/hexcal/compensate_report.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "tools/hexcal/terminal.h"
+
+namespace hexcal {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string number(double value, int digits) { return fmt::format("{:.{}f}", value, digits); }
+
+std::string method_table(const CalibrationReport& report) {
+  TextTable text({"method", "numbers", "rms_mm", "+-", "max_mm", "rms_deg", "+-", "max_deg", "lost"});
+  for (std::size_t i = 0; i < report.comparison.methods.size(); ++i) {
+    const CrossValidation& method = report.comparison.methods[i];
+    const bool chosen = method.name == report.chosen;
+    const std::string label = fmt::format("{} {}", chosen ? "*" : " ", method.name);
+    if (!method.failure.empty()) {
+      text.add_row({label, std::to_string(method.complexity), method.failure}, Colour::dim);
+      continue;
+    }
+    const ErrorStatistics& e = method.errors;
+    text.add_row(
+        {label, std::to_string(method.complexity), number(e.position_rms_mm, 4),
+         number(method.position_rms_se_mm, 4), number(e.position_max_mm, 4),
+         number(e.orientation_rms_rad * kDegPerRad, 4), number(method.orientation_rms_se_rad * kDegPerRad, 4),
+         number(e.orientation_max_rad * kDegPerRad, 4),
+         i < report.evaluations.size() ? std::to_string(report.evaluations[i].dropped.size()) : "-"},
+        chosen ? Colour::bold : Colour::plain);
+  }
+  return text.text();
+}
+
+std::string paper_table(const CalibrationReport& report) {
+  TextTable text({"the paper's ranges", "poses", "x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg",
+                  "position_mm", "orientation_deg", "improvement"});
+  const auto add = [&](const std::string& name, const ErrorStatistics& s, const std::string& improvement) {
+    std::vector<std::string> cells{name, std::to_string(s.poses)};
+    for (Eigen::Index i = 0; i < 6; ++i) cells.push_back(number(s.range[i] * (i < 3 ? 1 : kDegPerRad), 3));
+    cells.push_back(number(s.position_magnitude_mm, 3));
+    cells.push_back(number(s.orientation_magnitude_rad * kDegPerRad, 3));
+    cells.push_back(improvement);
+    text.add_row(cells);
+  };
+  add("uncompensated", *report.uncompensated, "");
+  for (const PaperEvaluation& evaluation : report.evaluations) {
+    const bool paper = evaluation.method.rfind("option", 0) == 0;
+    if (!paper && evaluation.method != report.chosen) continue;
+    if (evaluation.valid.empty()) continue;
+    // The paper's own way: the uncompensated ranges of all poses against those of the valid ones.
+    add(evaluation.method, evaluation.after,
+        fmt::format("{:.1f} %, {:.1f} %",
+                    improvement_percent(report.uncompensated->position_magnitude_mm,
+                                        evaluation.after.position_magnitude_mm),
+                    improvement_percent(report.uncompensated->orientation_magnitude_rad,
+                                        evaluation.after.orientation_magnitude_rad)));
+  }
+  return text.text();
+}
+
+std::string diagnosis(const CalibrationReport& report) {
+  const IdentifyResult& identified = *report.fitted.identified;
+  const Identifiability& judged = *report.identifiability;
+  std::string text = fmt::format(
+      "identified {} numbers: rank {}, {} known from the data, {:.1f} effective, condition {:.3g}, "
+      "sigma0 {:.2f}\n",
+      judged.free_parameters, judged.rank, judged.determined, identified.effective_parameters,
+      judged.condition, identified.sigma0_of_measurement);
+  text += fmt::format("noise: {:.4g} mm, {:.4g} deg per measured coordinate, legs {:.4g} mm\n",
+                      identified.position_sigma_mm, identified.orientation_sigma_rad * kDegPerRad,
+                      identified.leg_sigma_mm);
+  for (const LegDiagnosis& leg : judged.legs)
+    text += fmt::format("{} {}\n", leg.wrong ? "!" : " ", leg.sentence);
+  for (std::size_t i = 0; i < std::min<std::size_t>(3, judged.correlations.size()); ++i) {
+    const CorrelatedPair& pair = judged.correlations[i];
+    text += fmt::format("  {} and {} cannot be told apart (correlation {:+.3f})\n", pair.a, pair.b,
+                        pair.correlation);
+  }
+  if (!judged.advice.empty()) text += judged.advice + "\n";
+  return text;
+}
+
+const char* status_name(CommandStatus status) {
+  switch (status) {
+    case CommandStatus::ok:
+      return "ok";
+    case CommandStatus::out_of_stroke:
+      return "out_of_stroke";
+    case CommandStatus::joint_limit:
+      return "joint_limit";
+    case CommandStatus::no_pose:
+      return "no_pose";
+  }
+  return "";
+}
+
+Json six(const Vector6d& v) {
+  Json list = Json::array();
+  for (Eigen::Index i = 0; i < 6; ++i) list.push_back(i < 3 ? v[i] : v[i] * kDegPerRad);
+  return list;
+}
+
+Json json_of(const ErrorStatistics& s) {
+  return {{"poses", s.poses},
+          {"range_mm_deg", six(s.range)},
+          {"position_magnitude_mm", s.position_magnitude_mm},
+          {"orientation_magnitude_deg", s.orientation_magnitude_rad * kDegPerRad},
+          {"position_rms_mm", s.position_rms_mm},
+          {"position_max_mm", s.position_max_mm},
+          {"orientation_rms_deg", s.orientation_rms_rad * kDegPerRad},
+          {"orientation_max_deg", s.orientation_max_rad * kDegPerRad}};
+}
+
+// JSON has no infinity.
+Json finite(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json json_of_identified(const IdentifyResult& identified, const Identifiability& judged,
+                        const ObservationTable& table) {
+  Json out{{"free_parameters", judged.free_parameters},
+           {"rank", judged.rank},
+           {"determined", judged.determined},
+           {"effective_parameters", identified.effective_parameters},
+           {"condition", judged.condition},
+           {"sigma0", identified.sigma0_of_measurement},
+           {"position_sigma_mm", identified.position_sigma_mm},
+           {"orientation_sigma_deg", identified.orientation_sigma_rad * kDegPerRad},
+           {"leg_sigma_mm", identified.leg_sigma_mm},
+           {"advice", judged.advice}};
+  for (const ParameterReport& p : judged.parameters)
+    out["parameters"].push_back({{"name", p.name},
+                                 {"unit", p.unit},
+                                 {"correction", p.value},
+                                 {"sigma", p.sigma},
+                                 {"tolerance", finite(p.tolerance)}});
+  for (const CorrelatedPair& pair : judged.correlations)
+    out["correlations"].push_back({{"a", pair.a}, {"b", pair.b}, {"correlation", pair.correlation}});
+  for (const WeakDirection& weak : judged.weak)
+    out["weak"].push_back({{"gain", weak.gain}, {"parameters", weak.parameters}});
+  for (const LegDiagnosis& leg : judged.legs)
+    out["legs"].push_back({{"leg", leg.leg}, {"wrong", leg.wrong}, {"diagnosis", leg.sentence}});
+  const auto& poses = table.observations.poses;
+  for (std::size_t i = 0; i < identified.pose_residuals.size() && i < poses.size(); ++i)
+    out["poses"].push_back({{"residual_mm_deg", six(identified.pose_residuals[i])},
+                            {"weight", identified.weights[i]},
+                            {"influence", identified.influence[i]}});
+  return out;
+}
+
+}  // namespace
+
+std::string compensation_text(const CalibrationReport& report, const ObservationTable& table,
+                              const std::vector<CorrectedCommand>& commands,
+                              const std::vector<std::filesystem::path>& written) {
+  const MethodComparison& comparison = report.comparison;
+  std::string text = fmt::format(
+      "error that would remain after compensation at poses not used ({}), measuring noise included\n",
+      comparison.leave_one_out ? "leave-one-out" : fmt::format("{}-fold cross-validation", comparison.folds));
+  text += method_table(report);
+  text += report.why + "\n";
+  if (report.uncompensated && !report.evaluations.empty()) text += fmt::format("\n{}", paper_table(report));
+  if (!report.outliers.empty())
+    text += fmt::format("left out as near-singular outliers: {}\n", fmt::join(report.outliers, ", "));
+  for (const auto& pose : table.left_out) text += fmt::format("left out {}: {}\n", pose.id, pose.reason);
+  if (report.identifiability) text += fmt::format("\n{}", diagnosis(report));
+  int failed = 0;
+  for (const CorrectedCommand& command : commands) {
+    if (command.status == CommandStatus::ok) continue;
+    if (++failed <= 10) text += fmt::format("{}: {}\n", command.id, command.reason);
+  }
+  if (failed > 10) text += fmt::format("and {} more targets that cannot be reached\n", failed - 10);
+  double squares_mm = 0;
+  double squares_rad = 0;
+  int with_sigma = 0;
+  for (const CorrectedCommand& command : commands) {
+    if (!command.sigma) continue;
+    squares_mm += command.sigma->head<3>().squaredNorm();
+    squares_rad += command.sigma->tail<3>().squaredNorm();
+    ++with_sigma;
+  }
+  if (with_sigma > 0) {
+    text += fmt::format("predicted error at the {} targets after compensation: {:.4f} mm, {:.4f} deg rms\n",
+                        with_sigma, std::sqrt(squares_mm / with_sigma),
+                        std::sqrt(squares_rad / with_sigma) * kDegPerRad);
+  }
+  std::vector<std::string> names;
+  for (const auto& path : written) names.push_back(path.string());
+  return text + fmt::format("wrote {}\n", fmt::join(names, ", "));
+}
+
+std::string compensation_json(const CalibrationReport& report, const ObservationTable& table,
+                              const std::vector<CorrectedCommand>& commands,
+                              const std::vector<std::filesystem::path>& written) {
+  Json out{{"chosen", report.chosen},
+           {"why", report.why},
+           {"leave_one_out", report.comparison.leave_one_out},
+           {"folds", report.comparison.folds}};
+  for (std::size_t i = 0; i < report.comparison.methods.size(); ++i) {
+    const CrossValidation& method = report.comparison.methods[i];
+    Json entry{{"name", method.name}, {"numbers", method.complexity}};
+    if (!method.failure.empty()) {
+      entry["failure"] = method.failure;
+    } else {
+      entry["cross_validated"] = json_of(method.errors);
+      entry["position_rms_se_mm"] = method.position_rms_se_mm;
+      entry["orientation_rms_se_deg"] = method.orientation_rms_se_rad * kDegPerRad;
+    }
+    if (i < report.evaluations.size()) {
+      entry["lost"] = report.evaluations[i].dropped;
+      entry["valid_before"] = json_of(report.evaluations[i].before);
+      entry["valid_after"] = json_of(report.evaluations[i].after);
+    }
+    out["methods"].push_back(entry);
+  }
+  if (report.uncompensated) out["uncompensated"] = json_of(*report.uncompensated);
+  out["outliers"] = report.outliers;
+  for (const auto& pose : table.left_out)
+    out["left_out"].push_back({{"pose", pose.id}, {"reason", pose.reason}});
+  if (report.identifiability)
+    out["identified"] = json_of_identified(*report.fitted.identified, *report.identifiability, table);
+  for (const CorrectedCommand& command : commands) {
+    Json entry{{"pose", command.id}, {"status", status_name(command.status)}};
+    if (!command.reason.empty()) entry["reason"] = command.reason;
+    if (command.sigma) entry["sigma_mm_deg"] = six(*command.sigma);
+    out["commands"].push_back(entry);
+  }
+  for (const auto& path : written) out["written"].push_back(path.string());
+  return out.dump(2) + "\n";
+}
+
+}  // namespace hexcal
