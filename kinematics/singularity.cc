@@ -1,5 +1,6 @@
 #include "kinematics/singularity.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <cmath>
@@ -32,6 +33,28 @@ Vector6d sigma_gradient(const PlatformGeometry& geometry, const Rigid3& B_from_P
     gradient.tail<3>() += weight * arm.cross(by_joint + by_arm) / length_mm;
   }
   return gradient;
+}
+
+struct SingularValues {
+  Vector6d sigma;  // falling
+  Vector6d left;   // of the smallest
+  Vector6d right;
+};
+
+// The eigenvalues of J J^T cost a quarter of an SVD and give sigma_min to about 1e-16 condition^2,
+// relatively; the SVD takes over where that is not enough.
+SingularValues singular_values(const Matrix6d& j) {
+  SingularValues result;
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(j * j.transpose());
+  const Vector6d squared = eigen.eigenvalues().reverse();
+  if (squared[5] > 1e-8 * squared[0]) {
+    result.sigma = squared.cwiseSqrt();
+    result.left = eigen.eigenvectors().col(0);
+    result.right = j.transpose() * result.left / result.sigma[5];
+    return result;
+  }
+  const Eigen::JacobiSVD<Matrix6d> svd(j, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  return {svd.singularValues(), svd.matrixU().col(5), svd.matrixV().col(5)};
 }
 
 double length_used_mm(const PlatformGeometry& geometry, const SingularityOptions& options) {
@@ -81,18 +104,17 @@ SingularityMeasures singularity_measures(const PlatformGeometry& geometry, const
   m.characteristic_length_mm = length_used_mm(geometry, options);
   const double length_mm = m.characteristic_length_mm;
   const Matrix6d j = scaled_jacobian(geometry, B_from_P, length_mm);
-  const Eigen::JacobiSVD<Matrix6d> svd(j, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Vector6d sigma = svd.singularValues();
+  const SingularValues svd = singular_values(j);
+  const Vector6d& sigma = svd.sigma;
   constexpr double kFar = std::numeric_limits<double>::infinity();
   m.determinant = j.determinant();
   m.sigma_min = sigma[5];
   m.condition = sigma[5] > 0 ? sigma[0] / sigma[5] : kFar;
-  m.weakest_motion = svd.matrixV().col(5);
+  m.weakest_motion = svd.right;
   m.worst_gain_mm = sigma[5] > 0 ? m.weakest_motion.head<3>().norm() / sigma[5] : kFar;
   m.worst_gain_deg =
       sigma[5] > 0 ? m.weakest_motion.tail<3>().norm() / sigma[5] / length_mm * kDegPerRad : kFar;
-  const Vector6d gradient =
-      sigma_gradient(geometry, B_from_P, length_mm, svd.matrixU().col(5), m.weakest_motion);
+  const Vector6d gradient = sigma_gradient(geometry, B_from_P, length_mm, svd.left, m.weakest_motion);
   const double by_mm = gradient.head<3>().norm();
   const double by_rad = gradient.tail<3>().norm() * length_mm;
   m.distance_mm = by_mm > 0 ? sigma[5] / by_mm : kFar;

@@ -21,6 +21,9 @@ void add_simulate_command(CLI::App& app, Action& action);
 void add_compensate_command(CLI::App& app, Action& action);
 void add_plan_command(CLI::App& app, Action& action);
 void add_evaluate_command(CLI::App& app, Action& action);
+void add_legs_command(CLI::App& app, Action& action);
+void add_pose_command(CLI::App& app, Action& action);
+void add_workspace_command(CLI::App& app, Action& action);
 void add_completion_command(CLI::App& app, Action& action);
 
 }  // namespace hexcal

@@ -1,0 +1,100 @@
+#include "tools/hexcal/slice_picture.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+
+namespace hexcal {
+namespace {
+
+constexpr double kLeft = 80;
+constexpr double kTop = 30;
+constexpr double kSide = 480;
+constexpr int kTicks = 5;
+
+// Colours that differ in lightness too.
+const char* colour(PoseVerdict verdict) {
+  switch (verdict) {
+    case PoseVerdict::reachable:
+      return "#2a9d5c";
+    case PoseVerdict::too_short:
+      return "#cfe2f3";
+    case PoseVerdict::too_long:
+      return "#9fc5e8";
+    case PoseVerdict::base_joint:
+      return "#f9cb9c";
+    case PoseVerdict::platform_joint:
+      return "#e69138";
+    case PoseVerdict::legs_collide:
+      return "#8e7cc3";
+    case PoseVerdict::beyond_singular:
+      return "#660000";
+    case PoseVerdict::near_singular:
+      return "#e06666";
+    case PoseVerdict::not_a_pose:
+      return "#000000";
+  }
+  return "#000000";
+}
+
+constexpr std::array kAll{PoseVerdict::reachable,       PoseVerdict::too_short,
+                          PoseVerdict::too_long,        PoseVerdict::base_joint,
+                          PoseVerdict::platform_joint,  PoseVerdict::legs_collide,
+                          PoseVerdict::beyond_singular, PoseVerdict::near_singular};
+
+constexpr std::array kAxes{"x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg"};
+
+double shown(int axis, double value) { return axis < 3 ? value : value * kDegPerRad; }
+
+}  // namespace
+
+std::string slice_picture(const std::vector<SliceCell>& cells, const SliceOptions& options) {
+  const double width = kSide / options.u_count;
+  const double height = kSide / options.v_count;
+  std::string svg = fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" font-family=\"sans-serif\" "
+      "font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n",
+      kLeft + kSide + 160, kTop + kSide + 60);
+  // One rectangle per run of equal cells in a row.
+  for (int j = 0; j < options.v_count; ++j) {
+    const auto verdict = [&](int i) {
+      return cells[static_cast<std::size_t>(j) * static_cast<std::size_t>(options.u_count) +
+                   static_cast<std::size_t>(i)]
+          .verdict;
+    };
+    for (int i = 0; i < options.u_count;) {
+      int end = i + 1;
+      while (end < options.u_count && verdict(end) == verdict(i)) ++end;
+      svg += fmt::format("<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" fill=\"{}\"/>\n",
+                         kLeft + i * width, kTop + kSide - (j + 1) * height, (end - i) * width + 0.2,
+                         height + 0.2, colour(verdict(i)));
+      i = end;
+    }
+  }
+  for (int n = 0; n <= kTicks; ++n) {
+    const double part = static_cast<double>(n) / kTicks;
+    const double u = shown(options.axis_u, options.u_low + part * (options.u_high - options.u_low));
+    const double v = shown(options.axis_v, options.v_low + part * (options.v_high - options.v_low));
+    svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{:.1f}</text>\n",
+                       kLeft + part * kSide, kTop + kSide + 18, u);
+    svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"end\">{:.1f}</text>\n", kLeft - 6,
+                       kTop + kSide - part * kSide + 4, v);
+  }
+  svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n", kLeft + kSide / 2,
+                     kTop + kSide + 42, kAxes[static_cast<std::size_t>(options.axis_u)]);
+  svg +=
+      fmt::format("<text transform=\"translate(18 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
+                  kTop + kSide / 2, kAxes[static_cast<std::size_t>(options.axis_v)]);
+  double y = kTop + 10;
+  for (const PoseVerdict verdict : kAll) {
+    svg += fmt::format(
+        "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"14\" height=\"14\" fill=\"{}\"/><text x=\"{:.1f}\" "
+        "y=\"{:.1f}\">{}</text>\n",
+        kLeft + kSide + 16, y, colour(verdict), kLeft + kSide + 36, y + 11, name(verdict));
+    y += 22;
+  }
+  return svg + "</svg>\n";
+}
+
+}  // namespace hexcal

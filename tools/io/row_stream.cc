@@ -1,0 +1,290 @@
+#include "tools/io/row_stream.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <openssl/evp.h>
+#include <unistd.h>
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <future>
+#include <memory>
+
+#include "kinematics/geometry/input_error.h"
+
+namespace hexcal {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kBlock = std::size_t{1} << 22;
+constexpr std::size_t kLongestLine = std::size_t{1} << 20;
+
+std::string hash_of_file(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  const std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)> context(EVP_MD_CTX_new(), EVP_MD_CTX_free);
+  std::vector<char> buffer(kBlock);
+  bool good = context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1;
+  while (good && in) {
+    in.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+    good = EVP_DigestUpdate(context.get(), buffer.data(), static_cast<std::size_t>(in.gcount())) == 1;
+  }
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+  unsigned int length = 0;
+  if (!good || EVP_DigestFinal_ex(context.get(), digest.data(), &length) != 1)
+    throw std::runtime_error("SHA-256 is not available");
+  std::string hex;
+  for (unsigned int i = 0; i < length; ++i) hex += fmt::format("{:02x}", digest[i]);
+  return hex;
+}
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r'))
+    text.remove_suffix(1);
+  return text;
+}
+
+// Splits a line at its commas; quoted fields may hold commas. Quotes are taken off, doubled ones within are
+// kept in `unquoted` storage.
+void split(std::string_view line, std::vector<std::string_view>& fields, std::vector<std::string>& unquoted) {
+  fields.clear();
+  unquoted.clear();
+  unquoted.reserve(32);  // views into the strings must stay where they are
+  std::size_t at = 0;
+  while (true) {
+    std::size_t end = line.find(',', at);
+    const std::size_t first = line.find_first_not_of(" \t", at);
+    if (first != std::string_view::npos && line[first] == '"' && unquoted.size() < 32) {
+      std::string text;
+      std::size_t i = first + 1;
+      for (; i < line.size(); ++i) {
+        if (line[i] == '"' && i + 1 < line.size() && line[i + 1] == '"') {
+          text += line[i++];
+        } else if (line[i] == '"') {
+          break;
+        } else {
+          text += line[i];
+        }
+      }
+      end = line.find(',', i);
+      unquoted.push_back(std::move(text));
+      fields.push_back(unquoted.back());
+    } else {
+      fields.push_back(trimmed(line.substr(at, end == std::string_view::npos ? end : end - at)));
+    }
+    if (end == std::string_view::npos) return;
+    at = end + 1;
+  }
+}
+
+bool is_content(std::string_view line) {
+  const std::string_view text = trimmed(line);
+  return !text.empty() && text.front() != '#';
+}
+
+// Where the wanted columns stand.
+struct Layout {
+  std::size_t id = 0;
+  std::vector<std::size_t> numbers;
+  std::size_t fields = 0;
+};
+
+Layout layout_of(std::string_view header, const fs::path& path, std::size_t line,
+                 const RowTransform& transform) {
+  std::vector<std::string_view> names;
+  std::vector<std::string> storage;
+  split(header, names, storage);
+  const auto find = [&](const std::string& wanted) {
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (names[i] == wanted) return i;
+    }
+    std::string found;
+    for (const std::string_view n : names) found += fmt::format("{}{}", found.empty() ? "" : ",", n);
+    throw InputError(
+        fmt::format("{}:{}: found columns {}, wanted a column '{}'", path.string(), line, found, wanted));
+  };
+  Layout layout;
+  layout.id = find(transform.id_column);
+  for (const std::string& column : transform.columns) layout.numbers.push_back(find(column));
+  layout.fields = names.size();
+  return layout;
+}
+
+struct Piece {
+  std::string out;
+  StreamTally tally;
+};
+
+// All whole lines of `text`; the first is line `first_line` of the file.
+Piece transformed(std::string_view text, std::size_t first_line, const fs::path& path, const Layout& layout,
+                  const RowTransform& transform) {
+  Piece piece;
+  piece.out.reserve(text.size() * 2);
+  std::vector<std::string_view> fields;
+  std::vector<std::string> storage;
+  std::vector<double> numbers(layout.numbers.size());
+  for (std::size_t line = first_line; !text.empty(); ++line) {
+    const std::size_t end = text.find('\n');
+    const std::string_view row = text.substr(0, end);
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    if (!is_content(row)) continue;
+    split(row, fields, storage);
+    if (fields.size() != layout.fields) {
+      throw InputError(fmt::format("{}:{}: found {} fields, wanted {} as in the header", path.string(), line,
+                                   fields.size(), layout.fields));
+    }
+    for (std::size_t k = 0; k < numbers.size(); ++k) {
+      std::string_view field = trimmed(fields[layout.numbers[k]]);
+      if (field.size() > 1 && field.front() == '+') field.remove_prefix(1);
+      const auto [stop, error] = std::from_chars(field.data(), field.data() + field.size(), numbers[k]);
+      if (error != std::errc() || stop != field.data() + field.size() || !std::isfinite(numbers[k])) {
+        throw InputError(fmt::format("{}:{}: {}: found '{}', wanted a number", path.string(), line,
+                                     transform.columns[k], field));
+      }
+    }
+    const std::string_view id = fields[layout.id];
+    if (id.empty())
+      throw InputError(
+          fmt::format("{}:{}: {}: is empty, wanted a pose id", path.string(), line, transform.id_column));
+    ++piece.tally.rows;
+    if (!transform.row({id, numbers}, piece.out) && ++piece.tally.failed == 1) piece.tally.first_failed = id;
+  }
+  return piece;
+}
+
+// The output under a temporary name until it is complete.
+class PendingFile {
+ public:
+  explicit PendingFile(fs::path target) : target_(std::move(target)) {
+    const fs::path folder = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (fs::is_directory(target_, error))
+      throw InputError(fmt::format("{}: is a folder, wanted a file name to write", target_.string()));
+    path_ = folder / fmt::format(".{}.{}.tmp", target_.filename().string(), ::getpid());
+    descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
+    if (descriptor_ < 0) fail();
+  }
+  PendingFile(const PendingFile&) = delete;
+  PendingFile& operator=(const PendingFile&) = delete;
+  ~PendingFile() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+    if (!finished_) ::unlink(path_.c_str());
+  }
+  void write(std::string_view text) {
+    while (!text.empty()) {
+      const ssize_t count = ::write(descriptor_, text.data(), text.size());
+      if (count < 0 && errno == EINTR) continue;
+      if (count < 0) fail();
+      text.remove_prefix(static_cast<std::size_t>(count));
+    }
+  }
+  void finish() {
+    const bool flushed = ::fsync(descriptor_) == 0 || errno == EINVAL;
+    const bool closed = ::close(descriptor_) == 0;
+    descriptor_ = -1;
+    if (!flushed || !closed || ::rename(path_.c_str(), target_.c_str()) != 0) fail();
+    finished_ = true;
+  }
+
+ private:
+  [[noreturn]] void fail() const {
+    throw InputError(fmt::format("{}: cannot write: {}", target_.string(), std::strerror(errno)));
+  }
+
+  fs::path target_;
+  fs::path path_;
+  int descriptor_ = -1;
+  bool finished_ = false;
+};
+
+}  // namespace
+
+void append_number(std::string& out, double value, int decimals) {
+  std::array<char, 400> text;
+  const auto result =
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed, decimals);
+  std::string_view printed(text.data(), static_cast<std::size_t>(result.ptr - text.data()));
+  // No minus before a zero.
+  if (!printed.empty() && printed.front() == '-' &&
+      printed.find_first_not_of("-0.") == std::string_view::npos)
+    printed.remove_prefix(1);
+  out += printed;
+}
+
+StreamTally stream_rows(const fs::path& input, const fs::path& output, const std::string& head,
+                        const RowTransform& transform, int threads) {
+  std::error_code error;
+  if (!fs::exists(input, error)) throw InputError(fmt::format("{}: no such file", input.string()));
+  if (fs::is_directory(input, error))
+    throw InputError(fmt::format("{}: is a folder, wanted a file", input.string()));
+  std::ifstream in(input, std::ios::binary);
+  if (!in) throw InputError(fmt::format("{}: cannot read: {}", input.string(), std::strerror(errno)));
+  PendingFile out(output);
+  out.write(fmt::format("{}  {} sha256:{}\n{}", head, input.filename().string(), hash_of_file(input),
+                        transform.header));
+
+  std::size_t line = 1;
+  std::string name;
+  bool has_header = false;
+  Layout layout;
+  StreamTally tally;
+  std::string block;
+  while (true) {
+    // What is left of the last block, then whole lines.
+    const std::size_t kept = block.size();
+    block.resize(kept + kBlock);
+    in.read(block.data() + kept, static_cast<std::streamsize>(kBlock));
+    const bool last = in.gcount() < static_cast<std::streamsize>(kBlock);
+    if (in.bad()) throw InputError(fmt::format("{}: cannot read: {}", input.string(), std::strerror(errno)));
+    block.resize(kept + static_cast<std::size_t>(in.gcount()));
+    if (!has_header && line == 1 && block.starts_with("\xEF\xBB\xBF")) block.erase(0, 3);
+    const std::size_t cut = last ? block.size() : block.rfind('\n') + 1;
+    if (cut == 0 && block.size() > kLongestLine)
+      throw InputError(fmt::format("{}:{}: the line is too long", input.string(), line));
+    std::string_view text(block.data(), cut);
+    while (!has_header && !text.empty()) {
+      const std::size_t end = text.find('\n');
+      const std::string_view row = text.substr(0, end);
+      text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+      if (is_content(row)) {
+        layout = layout_of(row, input, line, transform);
+        has_header = true;
+      }
+      ++line;
+    }
+    // Equal shares of the block, cut at line ends; written in order.
+    std::vector<std::future<Piece>> pieces;
+    for (int t = threads; t >= 1; --t) {
+      const std::size_t wanted = text.size() / static_cast<std::size_t>(t);
+      const std::size_t end = t == 1 ? std::string_view::npos : text.find('\n', wanted);
+      const std::string_view share = text.substr(0, end == std::string_view::npos ? end : end + 1);
+      text.remove_prefix(share.size());
+      const auto work = [share, line, &input, &layout, &transform] {
+        return transformed(share, line, input, layout, transform);
+      };
+      pieces.push_back(std::async(t == 1 ? std::launch::deferred : std::launch::async, work));
+      line += static_cast<std::size_t>(std::count(share.begin(), share.end(), '\n'));
+    }
+    // The last share is worked on here, beside the others; an error in an earlier line is told first.
+    pieces.back().wait();
+    for (std::future<Piece>& piece : pieces) {
+      const Piece done = piece.get();
+      out.write(done.out);
+      if (tally.failed == 0) tally.first_failed = done.tally.first_failed;
+      tally.rows += done.tally.rows;
+      tally.failed += done.tally.failed;
+    }
+    if (last) break;
+    block.erase(0, cut);
+  }
+  if (!has_header) throw InputError(fmt::format("{}: is empty, wanted a header line", input.string()));
+  out.finish();
+  return tally;
+}
+
+}  // namespace hexcal
