@@ -52,6 +52,31 @@ std::vector<std::size_t> doubled(const std::vector<PathResult>& paths) {
   return out;
 }
 
+int count(const std::vector<PathResult>& paths, PathEnd end) {
+  return static_cast<int>(
+      std::count_if(paths.begin(), paths.end(), [end](const PathResult& p) { return p.end == end; }));
+}
+
+// The same poses of the same platform with another unit of length, which may be complex.
+GenericPlatform resized(GenericPlatform generic, const Complex& size) {
+  generic.platform.a *= size;
+  generic.platform.b *= size;
+  generic.platform.constant *= size * size;
+  for (ComplexPose& pose : generic.poses) pose.head<3>() *= size;
+  return generic;
+}
+
+std::vector<PathResult> all_paths(const GenericPlatform& generic, const PlatformGeometry& geometry,
+                                  const LegVector& lengths_mm, double unit_mm) {
+  const Way way{generic.platform, target(geometry, lengths_mm, unit_mm, generic.platform)};
+  std::vector<PathResult> paths;
+  for (const ComplexPose& start : generic.poses) paths.push_back(follow(way, start, 0.2));
+  for (const double contraction : {0.05, 0.01}) {
+    for (const std::size_t i : doubled(paths)) paths[i] = follow(way, generic.poses[i], contraction);
+  }
+  return paths;
+}
+
 }  // namespace
 
 AssemblyModes assembly_modes(const PlatformGeometry& geometry, const LegVector& lengths_mm) {
@@ -64,13 +89,20 @@ AssemblyModes assembly_modes(const PlatformGeometry& geometry, const LegVector& 
     result.reason = "a machine with a screw lead is not handled";
     return result;
   }
-  const GenericPlatform& generic = generic_platform();
   const double unit_mm = lengths_mm.mean();
-  const Way way{generic.platform, target(geometry, lengths_mm, unit_mm, generic.platform)};
   std::vector<PathResult> paths;
-  for (const ComplexPose& start : generic.poses) paths.push_back(follow(way, start, 0.2));
-  for (const double contraction : {0.05, 0.01}) {
-    for (const std::size_t i : doubled(paths)) paths[i] = follow(way, generic.poses[i], contraction);
+  int fewest = 41;
+  // A way may pass too near to infinity to be followed; another size of the start makes it another way.
+  for (const Complex& size :
+       {Complex(1, 0), std::polar(1.1, 0.7), std::polar(0.9, -1.9), std::polar(1.2, 2.6)}) {
+    std::vector<PathResult> attempt =
+        all_paths(resized(generic_platform(), size), geometry, lengths_mm, unit_mm);
+    const int lost = 40 - static_cast<int>(attempt.size()) + count(attempt, PathEnd::lost);
+    if (lost < fewest) {
+      fewest = lost;
+      paths = std::move(attempt);
+    }
+    if (fewest == 0) break;
   }
   result.paths_lost = 40 - static_cast<int>(paths.size());
 
