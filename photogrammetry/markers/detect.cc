@@ -137,6 +137,20 @@ Shared pool(const std::vector<PhotometricFit>& fits) {
   return information.ldlt().solve(rhs);
 }
 
+ResidualLevel residual_level(const std::vector<PhotometricFit>& fits) {
+  std::vector<double> noise;
+  std::vector<double> correlation;
+  for (const auto& fit : fits) {
+    if (!fit.converged) continue;
+    noise.push_back(fit.chi2_per_dof);
+    correlation.push_back(fit.covariance_factor / fit.chi2_per_dof);
+  }
+  if (noise.empty()) return {};
+  // A few markers cannot tell noise from their own misfit.
+  return {noise.size() < 4 ? 1 : std::clamp(median(noise), 1.0, kMaxNoiseFactor),
+          std::max(1.0, median(correlation))};
+}
+
 }  // namespace
 
 void DetectionOptions::validate() const {
@@ -162,32 +176,30 @@ std::vector<MarkerObservation> detect_markers(const cv::Mat& grey, ToneCurve ton
   PhotographModel photograph{camera != nullptr ? PixelMap(*camera) : PixelMap(grey.cols, grey.rows, {}),
                              ToneResponse(tone), estimate_noise(grey, {0, 0, grey.cols, grey.rows})};
   std::vector<PhotometricFit> fits(measured.size());
-  const auto fit_all = [&](bool shared_free) {
-    tbb::parallel_for(std::size_t{0}, measured.size(), [&](std::size_t k) {
-      const DecodedMarker& marker = markers[measured[k]];
-      const bool free = shared_free && side_of(marker) >= kSharedSidePx;
-      fits[k] = fit_marker(grey, photograph, family.patterns[static_cast<std::size_t>(marker.id)],
-                           fits[k].converged ? fits[k].corners_px : marker.corners_px,
-                           free && tone == ToneCurve::srgb, free && camera == nullptr);
-    });
+  const auto pattern_of = [&](std::size_t k) -> const MarkerPattern& {
+    return family.patterns[static_cast<std::size_t>(markers[measured[k]].id)];
   };
-  fit_all(true);
-  if (tone == ToneCurve::srgb || camera == nullptr) {
-    const Shared shared = pool(fits);
-    if (tone == ToneCurve::srgb) photograph.tone = ToneResponse(tone, shared[0], shared[1]);
-    if (camera == nullptr) photograph.map = PixelMap(grey.cols, grey.rows, LensStandIn{shared[2], shared[3]});
-    fit_all(false);
+  const bool shared = tone == ToneCurve::srgb || camera == nullptr;
+  tbb::parallel_for(std::size_t{0}, measured.size(), [&](std::size_t k) {
+    const DecodedMarker& marker = markers[measured[k]];
+    const bool free = side_of(marker) >= kSharedSidePx;
+    fits[k] = fit_marker(grey, photograph, pattern_of(k), marker.corners_px, free && tone == ToneCurve::srgb,
+                         free && camera == nullptr);
+  });
+  if (shared) {
+    const Shared found = pool(fits);
+    if (tone == ToneCurve::srgb) photograph.tone = ToneResponse(tone, found[0], found[1]);
+    if (camera == nullptr) photograph.map = PixelMap(grey.cols, grey.rows, LensStandIn{found[2], found[3]});
+    tbb::parallel_for(std::size_t{0}, measured.size(), [&](std::size_t k) {
+      if (fits[k].converged) fits[k] = fit_marker_again(grey, photograph, pattern_of(k), fits[k]);
+    });
   }
 
-  std::vector<double> quality;
-  for (const auto& fit : fits) {
-    if (fit.converged) quality.push_back(fit.chi2_per_dof);
-  }
-  const double noise_factor = quality.size() < 4 ? 1 : std::clamp(median(quality), 1.0, kMaxNoiseFactor);
+  const ResidualLevel level = residual_level(fits);
   for (std::size_t k = 0; k < measured.size(); ++k) {
     const MarkerObservation before = observations[measured[k]];
     MarkerObservation& observation = observations[measured[k]];
-    observation = observation_from(fits[k], grey, camera, noise_factor, options.refine);
+    observation = observation_from(fits[k], grey, camera, level, options.refine);
     observation.id = before.id;
     if (!fits[k].converged) {
       observation.corners_px = before.corners_px;

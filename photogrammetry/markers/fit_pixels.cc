@@ -147,6 +147,7 @@ FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, 
       return;
     }
     pixel.value = raw * scale;
+    pixel.weight = 1 / std::sqrt(photograph.noise.variance(pixel.value));
     if (request.free_lens) {
       pixel.by_lens =
           photograph.map.by_stand_in({static_cast<double>(x), static_cast<double>(y)}) * px_to_plane;

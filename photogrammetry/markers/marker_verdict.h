@@ -11,10 +11,19 @@ namespace hexcal {
                                         const std::array<Eigen::Vector2d, 4>& corners_px, bool free_tone,
                                         bool free_lens);
 
-/// What is reported of a fit. `noise_factor`: by how much the photograph's noise at edges exceeds its noise
-/// model.
+/// The same marker again, from its fit with an earlier model of the photograph.
+[[nodiscard]] PhotometricFit fit_marker_again(const cv::Mat& grey, const PhotographModel& photograph,
+                                              const MarkerPattern& pattern, const PhotometricFit& before);
+
+/// How a photograph's residuals compare with its noise model.
+struct ResidualLevel {
+  double noise = 1;        ///< variance at edges over that of the noise model, which JPEG makes too small
+  double correlation = 1;  ///< by which neighbouring residuals' correlation enlarges covariances
+};
+
+/// What is reported of a fit.
 [[nodiscard]] MarkerObservation observation_from(const PhotometricFit& fit, const cv::Mat& grey,
-                                                 const CameraModel* camera, double noise_factor,
+                                                 const CameraModel* camera, const ResidualLevel& level,
                                                  const RefineOptions& options);
 
 /// Angle between a square's normal and the line of sight, from its corners; by weak perspective without a

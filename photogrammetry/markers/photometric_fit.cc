@@ -26,10 +26,11 @@ using Matrix = Eigen::Matrix<double, kCount, kCount>;
 constexpr double kPixelVariance = 1.0 / 12;  // of the square a pixel integrates over
 constexpr double kMinBlur = 0.02;            // px^2
 constexpr double kHuber = 3.0;
-constexpr int kCoarsePixels = 2500;
-constexpr int kFinePixels = 24000;
-constexpr double kLargeSide = 300;  // px; from here on the illumination's curvature counts
-constexpr double kSmallSide = 40;   // px; from here on the blur's anisotropy can be told from the geometry
+constexpr double kNoLimit = 1e9;
+constexpr int kCoarsePixels = 1500;
+constexpr double kFineReachSigmas = 2.8;  // beyond, a pixel says nothing of the edge
+constexpr double kLargeSide = 300;        // px; from here on the illumination's curvature counts
+constexpr double kSmallSide = 40;  // px; from here on the blur's anisotropy can be told from the geometry
 
 // Standard deviations of what is expected before the first look; an absent one is 0.
 Vector prior_sigmas() {
@@ -52,17 +53,27 @@ class MarkerFit {
     activate({kBlur, 1}, true);
     activate({kBlack, 2}, true);
     activate({kLight, 2}, true);
-    select(3.6 * std::sqrt(parameters_[kBlur] + kPixelVariance) + 1.5, kCoarsePixels);
-    if (!set_levels() || !solve(12, 3e-3)) return fit;
+    if (request_.start) {
+      parameters_[kBlur] = std::max(request_.start->blur_px * request_.start->blur_px, kMinBlur);
+      parameters_[kBlack] = request_.start->black;
+      parameters_[kWhite] = request_.start->white;
+    } else {
+      select(3.6 * spread_px() + 1.5, kCoarsePixels);
+      if (!set_levels() || !solve(12, 5e-3)) return fit;
+    }
     const double side_px = 2 * frame_.half_side;
     activate({kBlur + 1, 2}, side_px >= kSmallSide);
     activate({kLight + 2, 3}, side_px >= kLargeSide);
     activate({kShared, 2}, request_.free_tone);
     activate({kShared + 2, 2}, request_.free_lens);
-    select(3.6 * std::sqrt(parameters_[kBlur] + kPixelVariance) + 0.5, kFinePixels);
-    if (!solve(3, 1e-3)) return fit;
-    if (request_.pattern.cells() > 2) drop_covered_cells();
-    if (!solve(6, 1e-4)) return fit;
+    select(kFineReachSigmas * spread_px() + 0.3, request_.max_pixels);
+    if (request_.pattern.cells() > 2) {
+      list_active();
+      if (!enough_pixels()) return fit;
+      (void)normals(true);
+      drop_covered_cells();
+    }
+    if (!solve(6, 3e-4)) return fit;
     finish(fit);
     return fit;
   }
@@ -119,7 +130,11 @@ class MarkerFit {
   void select(double reach_px, int max_pixels) {
     const PixelSelection selection{parameters_.segment<8>(kHomography), frame_, reach_px, max_pixels};
     selected_ = select_pixels(grey_, photograph_, *patch_, request_, box_, selection);
+    residuals_.assign(selected_.pixels.size(), 0);
+    scale_ = kNoLimit;
   }
+
+  double spread_px() const { return std::sqrt(parameters_[kBlur] + kPixelVariance); }
 
   // Black and white by linear least squares in linear light.
   bool set_levels() {
@@ -133,9 +148,6 @@ class MarkerFit {
     }
     if (selected_.pixels.size() < 20 || n.determinant() < 1e-6) return false;
     parameters_.segment<2>(kBlack) = n.inverse() * rhs;
-    for (FitPixel& pixel : selected_.pixels) {
-      pixel.weight = 1 / std::sqrt(photograph_.noise.variance(pixel.value));
-    }
     return parameters_[kWhite] > parameters_[kBlack];
   }
 
@@ -222,8 +234,9 @@ class MarkerFit {
   // Whitened residuals' median as a standard deviation, not below 1.
   double robust_scale() const {
     std::vector<double> sizes;
-    for (const FitPixel& pixel : selected_.pixels) {
-      if (pixel.kept) sizes.push_back(std::abs(pixel.value - evaluate(pixel, nullptr).value) * pixel.weight);
+    sizes.reserve(residuals_.size());
+    for (std::size_t i = 0; i < residuals_.size(); ++i) {
+      if (selected_.pixels[i].kept) sizes.push_back(std::abs(residuals_[i]));
     }
     if (sizes.empty()) return 1;
     const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
@@ -231,15 +244,13 @@ class MarkerFit {
     return std::max(1.0, 1.4826 * *middle);
   }
 
-  static double huber_cost(double r, double scale) {
-    const double z = std::abs(r) / scale;
-    return z <= kHuber ? r * r : scale * scale * kHuber * (2 * z - kHuber);
-  }
-
-  double cost(double scale) const {
+  double robust_cost() const {
     double sum = prior_cost();
-    for (const FitPixel& pixel : selected_.pixels) {
-      if (pixel.kept) sum += huber_cost((pixel.value - evaluate(pixel, nullptr).value) * pixel.weight, scale);
+    for (std::size_t i = 0; i < residuals_.size(); ++i) {
+      if (!selected_.pixels[i].kept) continue;
+      const double r = residuals_[i];
+      const double z = std::abs(r) / scale_;
+      sum += z <= kHuber ? r * r : scale_ * scale_ * kHuber * (2 * z - kHuber);
     }
     return sum;
   }
@@ -258,30 +269,30 @@ class MarkerFit {
   struct Normals {
     Matrix n;
     Vector rhs;
-    double cost;
   };
 
-  // Normal equations of the active parameters, compressed to the first `active_list_.size()` rows.
-  Normals normals(double scale, bool with_priors) const {
-    Normals result{Matrix::Zero(), Vector::Zero(), prior_cost()};
+  // Normal equations of the active parameters, compressed to the first `active_list_.size()` rows. Leaves the
+  // whitened residuals of all pixels in residuals_.
+  Normals normals(bool with_priors) {
+    Normals result{Matrix::Zero(), Vector::Zero()};
     const std::size_t count = active_list_.size();
     Vector row;
     std::array<double, kCount> j{};
-    for (const FitPixel& pixel : selected_.pixels) {
-      if (!pixel.kept) continue;
+    for (std::size_t at = 0; at < selected_.pixels.size(); ++at) {
+      const FitPixel& pixel = selected_.pixels[at];
       const double residual = (pixel.value - evaluate(pixel, &row).value) * pixel.weight;
-      const double size = std::abs(residual) / scale;
-      const double robust = size <= kHuber ? 1 : kHuber / size;
-      const double weight = std::sqrt(robust) * pixel.weight;
+      residuals_[at] = residual;
+      if (!pixel.kept) continue;
+      const double size = std::abs(residual) / scale_;
+      const double root = size <= kHuber ? 1 : std::sqrt(kHuber / size);
+      const double weight = root * pixel.weight;
       for (std::size_t k = 0; k < count; ++k) j[k] = row[active_list_[k]] * weight;
-      const double r = residual * std::sqrt(robust);
       for (std::size_t k = 0; k < count; ++k) {
         double* const column = result.n.data() + k * kCount;
         const double factor = j[k];
         for (std::size_t i = 0; i <= k; ++i) column[i] += factor * j[i];
-        result.rhs[static_cast<int>(k)] += factor * r;
+        result.rhs[static_cast<int>(k)] += factor * root * residual;
       }
-      result.cost += huber_cost(residual, scale);
     }
     if (with_priors) add_priors(result);
     for (std::size_t k = 0; k < count; ++k) {
@@ -307,7 +318,7 @@ class MarkerFit {
     for (int axis = 0; axis < 2; ++axis) {
       Eigen::Vector3d along = parameters_.segment<3>(3 * axis);
       along.normalize();
-      const double stiff = 1e6 * std::max(normals.n.diagonal().head<6>().maxCoeff(), 1.0);
+      const double stiff = std::max(normals.n.diagonal().head<6>().maxCoeff(), 1.0);
       normals.n.block<3, 3>(3 * axis, 3 * axis).triangularView<Eigen::Upper>() +=
           stiff * along * along.transpose();
     }
@@ -330,47 +341,41 @@ class MarkerFit {
     for (int i = kBlur + 1; i < kBlur + 3; ++i) parameters_[i] = std::clamp(parameters_[i], -limit, limit);
   }
 
-  // Levenberg-Marquardt until the square moves less than `tolerance_px`.
+  bool enough_pixels() const { return selected_.pixels.size() >= 2 * active_list_.size(); }
+
+  // Levenberg-Marquardt until the square moves less than `tolerance_px`. Robust weights from the second step
+  // on.
   bool solve(int max_iterations, double tolerance_px) {
     list_active();
-    set_weights();
     const auto count = static_cast<Eigen::Index>(active_list_.size());
-    if (selected_.pixels.size() < 2 * active_list_.size()) return false;
+    if (!enough_pixels()) return false;
     double damping = 1e-6;
-    double scale = robust_scale();
-    Normals at = normals(scale, true);
+    Normals at = normals(true);
     for (int iteration = 0; iteration < max_iterations; ++iteration) {
+      scale_ = robust_scale();
+      const double cost = robust_cost();
       const Vector before = parameters_;
-      bool better = false;
-      double moved = 0;
-      for (int attempt = 0; attempt < 6 && !better; ++attempt) {
-        Eigen::MatrixXd n = at.n.topLeftCorner(count, count);
-        n.diagonal() *= 1 + damping;
-        const Eigen::VectorXd step = n.ldlt().solve(at.rhs.head(count));
-        if (!step.allFinite()) return false;
-        apply(step);
-        moved = step.head(request_.affine ? 6 : 8).cwiseAbs().maxCoeff() * frame_.half_side;
-        better = moved < 0.1 * tolerance_px || cost(scale) <= at.cost;
-        if (!better) {
-          parameters_ = before;
-          damping = std::max(damping * 30, 1e-4);
-        }
+      Eigen::MatrixXd n = at.n.topLeftCorner(count, count);
+      n.diagonal() *= 1 + damping;
+      const Eigen::VectorXd step = n.ldlt().solve(at.rhs.head(count));
+      if (!step.allFinite()) return false;
+      apply(step);
+      const double moved = step.head(request_.affine ? 6 : 8).cwiseAbs().maxCoeff() * frame_.half_side;
+      if (moved < tolerance_px) break;
+      Normals next = normals(true);
+      if (robust_cost() <= cost * (1 + 1e-9)) {
+        damping = std::max(damping * 0.1, 1e-9);
+        at = next;
+      } else {
+        parameters_ = before;
+        damping = std::max(damping * 30, 1e-4);
+        if (damping > 1e6) break;
       }
-      if (!better) return iteration > 0;  // at the bottom as far as rounding goes
-      damping = std::max(damping * 0.1, 1e-9);
-      if (moved < tolerance_px) return plausible();
-      at = normals(scale, true);
     }
     return plausible();
   }
 
   bool plausible() const { return parameters_.allFinite() && parameters_[kWhite] > parameters_[kBlack]; }
-
-  void set_weights() {
-    for (FitPixel& pixel : selected_.pixels) {
-      pixel.weight = 1 / std::sqrt(photograph_.noise.variance(evaluate(pixel, nullptr).value));
-    }
-  }
 
   // Drops cells whose pixels disagree with the model as a block: something covers them.
   void drop_covered_cells() {
@@ -383,9 +388,9 @@ class MarkerFit {
     constexpr int kMinPixels = 6;
     std::map<int, Cell> cells;
     const double scale = robust_scale();
-    for (const FitPixel& pixel : selected_.pixels) {
-      const double r = (pixel.value - evaluate(pixel, nullptr).value) * pixel.weight / scale;
-      Cell& cell = cells[pixel.cell];
+    for (std::size_t i = 0; i < residuals_.size(); ++i) {
+      const double r = residuals_[i] / scale;
+      Cell& cell = cells[selected_.pixels[i].cell];
       cell.sum += std::min(r * r, kMaxTerm);
       ++cell.count;
     }
@@ -395,9 +400,8 @@ class MarkerFit {
     }
   }
 
-  void finish(PhotometricFit& fit) const {
-    const double scale = robust_scale();
-    const Normals at = normals(scale, false);
+  void finish(PhotometricFit& fit) {
+    const Normals at = normals(false);
     Normals with_priors = at;
     add_priors(with_priors);
     const auto count = static_cast<Eigen::Index>(active_list_.size());
@@ -408,7 +412,7 @@ class MarkerFit {
     const Eigen::MatrixXd covariance = decomposition.solve(Eigen::MatrixXd::Identity(count, count));
 
     const int geometry = request_.affine ? 6 : 8;
-    measure_residuals(fit, scale, covariance, geometry);
+    measure_residuals(fit, covariance, geometry);
     place_corners(fit, covariance.topLeftCorner(geometry, geometry), geometry);
     fit.blur_px = std::sqrt(parameters_[kBlur]);
     fit.black = parameters_[kBlack];
@@ -419,19 +423,20 @@ class MarkerFit {
 
   // Fit quality, and the score's covariance summed by blocks (White 1980, clustered): residuals of
   // neighbouring pixels are not independent after JPEG or where the model misfits.
-  void measure_residuals(PhotometricFit& fit, double scale, const Eigen::MatrixXd& covariance,
-                         int geometry) const {
+  void measure_residuals(PhotometricFit& fit, const Eigen::MatrixXd& covariance, int geometry) const {
     std::map<int, Vector> scores;
     double sum = 0;
     double used = 0;
     int agreeing = 0;
     Vector row;
-    for (const FitPixel& pixel : selected_.pixels) {
-      const double residual = (pixel.value - evaluate(pixel, &row).value) * pixel.weight;
-      if (pixel.kept && std::abs(residual) < 5 * scale) ++agreeing;
+    for (std::size_t i = 0; i < residuals_.size(); ++i) {
+      const FitPixel& pixel = selected_.pixels[i];
+      const double residual = residuals_[i];
+      if (pixel.kept && std::abs(residual) < 5 * scale_) ++agreeing;
       if (!pixel.kept) continue;
-      const double size = std::abs(residual) / scale;
+      const double size = std::abs(residual) / scale_;
       const double robust = size <= kHuber ? 1 : kHuber / size;
+      (void)evaluate(pixel, &row);
       sum += robust * residual * residual;
       used += 1;
       auto [entry, is_new] = scores.try_emplace(pixel.block, Vector::Zero());
@@ -532,6 +537,8 @@ class MarkerFit {
   Vector start_ = Vector::Zero();
   std::array<bool, kCount> active_{};
   std::vector<int> active_list_;
+  std::vector<double> residuals_;  // whitened
+  double scale_ = kNoLimit;        // of the residuals, for the robust weights
 };
 
 }  // namespace

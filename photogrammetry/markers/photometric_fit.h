@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 
 #include "photogrammetry/markers/blurred_pattern.h"
 #include "photogrammetry/markers/image_noise.h"
@@ -22,15 +23,22 @@ struct PhotographModel {
 /// two.
 constexpr int kNumShared = 4;
 
+struct FitStart {
+  double blur_px, black, white;
+};
+
 struct FitRequest {
   BlurredPattern pattern;
-  double square_cells = 0;                    ///< the measured square, centred on the pattern
-  std::array<Eigen::Vector2d, 4> corners_px;  ///< of that square, within 0.5 px or so
-  bool affine = false;                        ///< no perspective: a saddle point's small window
+  double square_cells = 0;                      ///< the measured square, centred on the pattern
+  std::array<Eigen::Vector2d, 4> corners_px{};  ///< of that square, within 0.5 px or so
+  bool affine = false;                          ///< no perspective: a saddle point's small window
   bool free_tone = false;
   bool free_lens = false;  ///< only without a camera
   /// Half the side of the window of a saddle point in cells; infinite for markers.
   double window_cells = 1e9;
+  int max_pixels = 12000;  ///< more are thinned
+  /// From an earlier fit whose corners these are: the coarse stage is left out.
+  std::optional<FitStart> start = std::nullopt;
 };
 
 struct PhotometricFit {

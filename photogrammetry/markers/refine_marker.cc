@@ -14,6 +14,7 @@ namespace hexcal {
 namespace {
 
 constexpr double kNoiseMarginPx = 24;
+constexpr int kPixelsOfFirstLook = 5000;  // when the photograph's own parameters are still to be told
 
 cv::Rect box_around(const std::array<Eigen::Vector2d, 4>& corners, double margin) {
   Eigen::Vector2d low = corners[0];
@@ -112,6 +113,7 @@ PhotometricFit fit_marker(const cv::Mat& grey, const PhotographModel& photograph
   FitRequest request{BlurredPattern(pattern), pattern.square_cells, corners_px};
   request.free_tone = free_tone;
   request.free_lens = free_lens;
+  if (free_tone || free_lens) request.max_pixels = kPixelsOfFirstLook;
   if (const auto scanned =
           scan_edges(grey, photograph.tone, request.pattern, pattern.square_cells, corners_px)) {
     request.corners_px = *scanned;
@@ -119,13 +121,20 @@ PhotometricFit fit_marker(const cv::Mat& grey, const PhotographModel& photograph
   return fit_pattern(grey, photograph, request);
 }
 
+PhotometricFit fit_marker_again(const cv::Mat& grey, const PhotographModel& photograph,
+                                const MarkerPattern& pattern, const PhotometricFit& before) {
+  FitRequest request{BlurredPattern(pattern), pattern.square_cells, before.corners_px};
+  request.start = FitStart{before.blur_px, before.black, before.white};
+  return fit_pattern(grey, photograph, request);
+}
+
 MarkerObservation observation_from(const PhotometricFit& fit, const cv::Mat& grey, const CameraModel* camera,
-                                   double noise_factor, const RefineOptions& options) {
+                                   const ResidualLevel& level, const RefineOptions& options) {
   MarkerObservation marker;
   if (!fit.converged) return marker;
   marker.corners_px = fit.corners_px;
-  marker.chi2_per_dof = fit.chi2_per_dof / noise_factor;
-  marker.covariance_px2 = fit.covariance_px2 * std::max(fit.covariance_factor, fit.chi2_per_dof);
+  marker.chi2_per_dof = fit.chi2_per_dof / level.noise;
+  marker.covariance_px2 = fit.covariance_px2 * (fit.chi2_per_dof * level.correlation);
   marker.blur_px = fit.blur_px;
   marker.contrast = fit.white - fit.black;
   marker.side_px = mean_side(fit.corners_px);
@@ -142,7 +151,8 @@ MarkerObservation refine_marker(const cv::Mat& grey, ToneCurve tone, const Marke
                                    estimate_noise(grey, box_around(corners_px, kNoiseMarginPx))};
   const bool free_tone = tone == ToneCurve::srgb && mean_side(corners_px) > 3 * options.min_side_px;
   const PhotometricFit fit = fit_marker(grey, photograph, pattern, corners_px, free_tone, false);
-  return observation_from(fit, grey, camera, 1.0, options);
+  return observation_from(fit, grey, camera, {1.0, std::max(1.0, fit.covariance_factor / fit.chi2_per_dof)},
+                          options);
 }
 
 }  // namespace hexcal

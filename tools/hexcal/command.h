@@ -18,8 +18,9 @@ enum ExitCode : int {
 
 // One per cmd_NAME.cc: adds the subcommand with its flags and sets `action` when it is the one called.
 void add_simulate_command(CLI::App& app, Action& action);
-void add_compensate_command(CLI::App& app, Action& action);
+void add_detect_command(CLI::App& app, Action& action);
 void add_plan_command(CLI::App& app, Action& action);
+void add_compensate_command(CLI::App& app, Action& action);
 void add_evaluate_command(CLI::App& app, Action& action);
 void add_legs_command(CLI::App& app, Action& action);
 void add_pose_command(CLI::App& app, Action& action);

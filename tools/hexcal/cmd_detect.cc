@@ -1,0 +1,162 @@
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+
+#include "kinematics/geometry/input_error.h"
+#include "photogrammetry/markers/detect.h"
+#include "photogrammetry/photograph/sha256.h"
+#include "tools/hexcal/command.h"
+#include "tools/hexcal/terminal.h"
+#include "tools/hexcal/version.h"
+#include "tools/io/atomic_file.h"
+#include "tools/io/camera_file.h"
+#include "tools/io/observations_file.h"
+
+namespace hexcal {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kFooter = R"(Sample output:
+  photograph    found  not usable
+  DSC_0001.JPG     16
+  DSC_0002.JPG     15  104 cut_by_frame
+  2 photographs, 31 markers in observations.txt)";
+
+struct Flags {
+  std::vector<fs::path> images;
+  std::string family = "tag36h11";
+  std::vector<int> ids;
+  fs::path camera;
+  fs::path output;
+  bool json = false;
+};
+
+bool is_photograph(const fs::path& path) {
+  static const std::set<std::string> kExtensions{".jpg", ".jpeg", ".png", ".tif", ".tiff", ".nef", ".dng"};
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return kExtensions.count(extension) > 0;
+}
+
+struct Source {
+  fs::path path;
+  std::string name;  // as written: relative to the folder that was given
+};
+
+std::vector<Source> list_photographs(const std::vector<fs::path>& inputs) {
+  std::vector<Source> sources;
+  for (const fs::path& input : inputs) {
+    if (!fs::is_directory(input)) {
+      if (!fs::exists(input)) throw InputError(fmt::format("{}: no such file", input.string()));
+      sources.push_back({input, input.filename().string()});
+      continue;
+    }
+    std::vector<Source> found;
+    for (const auto& entry : fs::recursive_directory_iterator(input)) {
+      if (entry.is_regular_file() && is_photograph(entry.path())) {
+        found.push_back({entry.path(), entry.path().lexically_relative(input).generic_string()});
+      }
+    }
+    std::sort(found.begin(), found.end(), [](const Source& a, const Source& b) { return a.name < b.name; });
+    if (found.empty()) throw InputError(fmt::format("{}: no photographs in this folder", input.string()));
+    sources.insert(sources.end(), found.begin(), found.end());
+  }
+  return sources;
+}
+
+std::string not_usable(const PhotographObservations& photograph) {
+  if (photograph.status != PhotographStatus::ok) {
+    return fmt::format("{}: {}", photograph_status_name(photograph.status), photograph.reason);
+  }
+  std::string text;
+  for (const auto& marker : photograph.markers) {
+    if (marker.status == MarkerStatus::ok) continue;
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", marker.id, marker_status_name(marker.status));
+  }
+  return text;
+}
+
+int count_ok(const PhotographObservations& photograph) {
+  return static_cast<int>(
+      std::count_if(photograph.markers.begin(), photograph.markers.end(),
+                    [](const MarkerObservation& marker) { return marker.status == MarkerStatus::ok; }));
+}
+
+int run(const Flags& flags) {
+  const MarkerFamily& family = marker_family(flags.family);
+  const std::vector<Source> sources = list_photographs(flags.images);
+  std::optional<CalibratedCamera> camera;
+  DetectionSet set{flags.family, {}, {}};
+  if (!flags.camera.empty()) {
+    camera = read_camera_file(flags.camera);
+    set.camera_sha256 = sha256_hex(read_file(flags.camera));
+  }
+  DetectionOptions options;
+  options.ids = flags.ids;
+  options.validate();
+  set.photographs.resize(sources.size());
+  {
+    ProgressBar bar("detect", sources.size());
+    tbb::parallel_for(std::size_t{0}, sources.size(), [&](std::size_t i) {
+      const Photograph photograph = read_photograph(sources[i].path);
+      set.photographs[i] = observe_photograph(photograph, family, options, camera ? &camera->model : nullptr);
+      set.photographs[i].name = sources[i].name;
+      bar.advance();
+    });
+  }
+  write_file_atomically(flags.output,
+                        observations_text(set, provenance_line(kVersion, "detect", {flags.camera})));
+
+  int markers = 0;
+  bool failed = false;
+  TextTable table({"photograph", "found", "not usable"});
+  table.align_left(2);
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (const auto& photograph : set.photographs) {
+    const int ok = count_ok(photograph);
+    const bool bad = photograph.status != PhotographStatus::ok;
+    markers += ok;
+    failed = failed || bad;
+    table.add_row({photograph.name, fmt::format("{}", ok), not_usable(photograph)},
+                  bad ? Colour::bad : Colour::plain);
+    rows.push_back({{"photograph", photograph.name},
+                    {"status", photograph_status_name(photograph.status)},
+                    {"markers", ok},
+                    {"not_usable", not_usable(photograph)}});
+  }
+  if (flags.json) {
+    fmt::print("{}\n", nlohmann::ordered_json{{"photographs", rows}, {"markers", markers}}.dump(2));
+  } else {
+    fmt::print("{}{} photographs, {} markers in {}\n", table.text(), set.photographs.size(), markers,
+               flags.output.string());
+  }
+  return failed ? kSomeFailed : kDone;
+}
+
+}  // namespace
+
+void add_detect_command(CLI::App& app, Action& action) {
+  CLI::App* command =
+      app.add_subcommand("detect", "Measure the markers in photographs, for measure --observations");
+  command->footer(kFooter);
+  const auto flags = std::make_shared<Flags>();
+  command->add_option("IMAGES", flags->images, "photographs, or folders of them")->required();
+  command->add_option("--family", flags->family, "of the markers: tag36h11, DICT_4X4_50, ...")
+      ->capture_default_str();
+  command->add_option("--ids", flags->ids, "look for these ids only")->delimiter(',');
+  command->add_option("--camera", flags->camera, "camera.yaml whose lens stands inside the measurement");
+  command->add_option("-o,--output", flags->output, "file of observations to write")->required();
+  command->add_flag("--json", flags->json, "print the summary as JSON");
+  command->callback([&action, flags] { action = [flags] { return run(*flags); }; });
+}
+
+}  // namespace hexcal
