@@ -22,5 +22,7 @@ void add_compensate_command(CLI::App& app, Action& action);
 void add_plan_command(CLI::App& app, Action& action);
 void add_evaluate_command(CLI::App& app, Action& action);
 void add_completion_command(CLI::App& app, Action& action);
+void add_template_command(CLI::App& app, Action& action);
+void add_camera_command(CLI::App& app, Action& action);
 
 }  // namespace hexcal
