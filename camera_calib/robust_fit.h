@@ -9,7 +9,7 @@ namespace hexcal {
 /// What may vary in a fit: the lens model with its free terms, and the freedom of the sheets.
 struct CameraVariant {
   LensModel lens = LensModel::brown;
-  std::vector<bool> free_parameters;  ///< per parameter; empty: all but the affinity
+  std::vector<char> free_parameters;  ///< per parameter; empty: all but the affinity
   BoardFreedom board = BoardFreedom::ideal;
 };
 

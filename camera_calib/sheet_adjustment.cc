@@ -114,8 +114,8 @@ void store(const Blocks& blocks, const std::vector<DrawnSheet>& drawn, Calibrati
   }
 }
 
-std::vector<bool> free_camera(const CameraModel& camera, const AdjustmentOptions& options) {
-  if (options.only_poses) return std::vector<bool>(static_cast<std::size_t>(camera.parameters.size()), false);
+std::vector<char> free_camera(const CameraModel& camera, const AdjustmentOptions& options) {
+  if (options.only_poses) return std::vector<char>(static_cast<std::size_t>(camera.parameters.size()), false);
   return options.free_parameters.empty() ? all_but_affinity(camera.lens) : options.free_parameters;
 }
 
@@ -134,7 +134,7 @@ void add_camera(Network& network, Blocks& blocks, const CameraModel& camera,
   ceres::Problem& problem = *network.problem;
   problem.AddParameterBlock(blocks.camera.data(), static_cast<int>(blocks.camera.size()));
   std::vector<int> held;
-  const std::vector<bool> free = free_camera(camera, options);
+  const std::vector<char> free = free_camera(camera, options);
   for (std::size_t i = 0; i < free.size(); ++i) {
     if (!free[i]) held.push_back(static_cast<int>(i));
   }
@@ -268,7 +268,7 @@ void add_residuals(const Network& network, Blocks& blocks, AdjustmentResult& res
 }
 
 // The camera block comes out of the solver without its held parameters; put them back as zero rows.
-Eigen::MatrixXd with_held(const Eigen::MatrixXd& covariance, const std::vector<bool>& free) {
+Eigen::MatrixXd with_held(const Eigen::MatrixXd& covariance, const std::vector<char>& free) {
   const auto n = static_cast<Eigen::Index>(free.size());
   Eigen::MatrixXd out = Eigen::MatrixXd::Zero(n, n);
   Eigen::Index a = 0;
@@ -326,8 +326,8 @@ const char* board_freedom_name(BoardFreedom freedom) {
   return "";
 }
 
-std::vector<bool> all_but_affinity(LensModel lens) {
-  std::vector<bool> free(camera_parameter_names(lens).size(), true);
+std::vector<char> all_but_affinity(LensModel lens) {
+  std::vector<char> free(camera_parameter_names(lens).size(), true);
   free[1] = false;
   return free;
 }

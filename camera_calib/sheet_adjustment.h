@@ -51,7 +51,7 @@ struct CalibrationState {
 struct AdjustmentOptions {
   BoardFreedom board = BoardFreedom::ideal;
   /// Which camera parameters are free, by index; empty: all but the affinity.
-  std::vector<bool> free_parameters;
+  std::vector<char> free_parameters;
   /// Noise in px of every coordinate beside the measured covariances: what the model leaves unexplained.
   double extra_sigma_px = 0;
   bool robust = false;      ///< Huber's loss at the 99 % point of each feature's chi^2
@@ -85,6 +85,6 @@ struct AdjustmentResult {
                                              const AdjustmentOptions& options);
 
 /// Every parameter free but the affinity, which a lens of round elements does not have.
-[[nodiscard]] std::vector<bool> all_but_affinity(LensModel lens);
+[[nodiscard]] std::vector<char> all_but_affinity(LensModel lens);
 
 }  // namespace hexcal
