@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "camera_calib/find_chessboard.h"
+#include "camera_calib/find_dots.h"
 #include "camera_calib/initial_camera.h"
 #include "camera_calib/robust_fit.h"
 #include "photogrammetry/markers/detect.h"
@@ -100,7 +101,7 @@ void measure_saddles(const cv::Mat& grey, ToneCurve tone, const PredictedSheet& 
   const int count = static_cast<int>(predicted.geometry().saddles.size());
   for (int i = 0; i < count; ++i) {
     const Eigen::Vector3d& point = predicted.points_mm()[static_cast<std::size_t>(first + i)];
-    const double reach = 0.9 * description.pitch_mm;
+    const double reach = description.pitch_mm;
     const auto px = predicted.at(point);
     const auto x = predicted.at(point + Eigen::Vector3d(reach, 0, 0));
     const auto y = predicted.at(point - Eigen::Vector3d(0, reach, 0));
@@ -131,8 +132,7 @@ void measure_dots(const cv::Mat& grey, ToneCurve tone, const PredictedSheet& pre
 }
 
 bool has_saddles_or_dots(const Sheet& sheet) {
-  return sheet.kind == SheetKind::charuco || sheet.kind == SheetKind::dots ||
-         sheet.kind == SheetKind::photomodeler;
+  return sheet.kind == SheetKind::charuco || sheet.kind == SheetKind::dots;
 }
 
 void detect_chessboard(const cv::Mat& grey, ToneCurve tone, const Sheet& sheet, int index,
@@ -154,6 +154,38 @@ void detect_chessboard(const cv::Mat& grey, ToneCurve tone, const Sheet& sheet, 
       const Eigen::Vector2d to_y = r + 1 < rows ? corner(c, r + 1) - at : at - corner(c, r - 1);
       out.features.push_back(from_point(refine_saddle(grey, tone, at, to_x, to_y), index, r * columns + c));
     }
+  }
+}
+
+// Homography of the sheet's plane near dot `at` from the dots found around it.
+std::optional<Eigen::Matrix3d> homography_around(const std::vector<SheetDot>& dots,
+                                                 const std::vector<std::optional<Eigen::Vector2d>>& found,
+                                                 std::size_t at, double reach_mm) {
+  std::vector<Eigen::Vector2d> sheet;
+  std::vector<Eigen::Vector2d> image;
+  for (std::size_t i = 0; i < dots.size(); ++i) {
+    if (!found[i] || (dots[i].centre_mm - dots[at].centre_mm).norm() > reach_mm) continue;
+    sheet.push_back(dots[i].centre_mm);
+    image.push_back(*found[i]);
+  }
+  return sheet.size() >= 6 ? homography_from_points(sheet, image) : std::nullopt;
+}
+
+void detect_ringed_dots(const cv::Mat& grey, ToneCurve tone, const Sheet& sheet, int index,
+                        SheetDetection& out) {
+  const std::vector<std::optional<Eigen::Vector2d>> found = find_ringed_dots(grey, sheet);
+  if (found.empty()) {
+    out.reason = "the four ringed dots were not found";
+    return;
+  }
+  const std::vector<SheetDot> dots = sheet_geometry(sheet).dots;
+  for (std::size_t i = 0; i < dots.size(); ++i) {
+    if (!found[i]) continue;
+    const auto homography = homography_around(dots, found, i, 2.3 * sheet.pitch_mm);
+    if (!homography) continue;
+    out.features.push_back(
+        from_point(refine_dot(grey, tone, *homography, dots[i].centre_mm, 0.5 * dots[i].diameter_mm), index,
+                   static_cast<int>(i)));
   }
 }
 
@@ -222,6 +254,9 @@ SheetDetection detect_sheets(const cv::Mat& grey, ToneCurve tone, const std::vec
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     if (sheets[s].kind == SheetKind::chessboard)
       detect_chessboard(grey, tone, sheets[s], static_cast<int>(s), out);
+    if (sheets[s].kind == SheetKind::photomodeler) {
+      detect_ringed_dots(grey, tone, sheets[s], static_cast<int>(s), out);
+    }
     if (!sheets[s].family.empty()) families.insert(sheets[s].family);
   }
   for (const std::string& family : families) detect_family(grey, tone, sheets, family, out);

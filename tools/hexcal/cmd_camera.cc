@@ -1,30 +1,41 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 
+#include "camera_calib/camera_report.h"
+#include "camera_calib/compare_cameras.h"
+#include "camera_calib/measure_camera.h"
 #include "kinematics/geometry/input_error.h"
-#include "tools/hexcal/camera_photographs.h"
+#include "tools/hexcal/camera_tables.h"
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/calibration_tables.h"
 #include "tools/io/camera_file.h"
 #include "tools/io/sheet_file.h"
+#include "tools/io/template_pdf.h"
 
 namespace hexcal {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
 struct Flags {
   std::vector<fs::path> images;
   std::vector<fs::path> templates;
   fs::path output;
+  fs::path library;
+  fs::path poses;
+  std::vector<fs::path> compare;
+  std::string ruler;
   std::string lens;
   std::string board;
   bool json = false;
@@ -41,7 +52,42 @@ constexpr const char* kSynopsis =
   f_px      9011.13 +- 0.21
   verdict: good
 
+  hexcal camera --compare a.yaml b.yaml     how far two calibrations differ, and whether that is more than noise
+
 Exit code 1 if photographs failed or the verdict is retake; the camera file is written all the same.)";
+
+bool is_photograph(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  static const std::set<std::string> known{".jpg", ".jpeg", ".png", ".tif", ".tiff", ".nef", ".dng"};
+  return known.count(extension) > 0;
+}
+
+// Files as given, folders replaced by the photographs in them, sorted.
+std::vector<fs::path> photograph_paths(const std::vector<fs::path>& given) {
+  std::vector<fs::path> out;
+  for (const fs::path& path : given) {
+    std::error_code error;
+    if (!fs::is_directory(path, error)) {
+      if (!fs::exists(path, error))
+        throw InputError(fmt::format("{}: no such file or folder", path.string()));
+      out.push_back(path);
+      continue;
+    }
+    std::vector<fs::path> found;
+    for (const auto& entry : fs::directory_iterator(path)) {
+      if (entry.is_regular_file() && is_photograph(entry.path())) found.push_back(entry.path());
+    }
+    if (found.empty()) {
+      throw InputError(
+          fmt::format("{}: holds no photograph (jpg, jpeg, png, tif, tiff, nef, dng)", path.string()));
+    }
+    std::sort(found.begin(), found.end());
+    out.insert(out.end(), found.begin(), found.end());
+  }
+  return out;
+}
 
 std::vector<Sheet> read_sheets(const std::vector<fs::path>& files) {
   std::vector<Sheet> sheets;
@@ -61,145 +107,97 @@ CalibrateOptions options_of(const Flags& flags) {
   return options;
 }
 
-void print_photographs(const CameraReport& report) {
-  TextTable table(
-      {"photograph", "points", "rejected", "rms_px", "tilt_deg", "distance_mm", "blur_px", "status"});
-  table.align_left(7);
-  for (const PhotographRow& row : report.photographs) {
-    if (row.used) {
-      table.add_row({row.name, fmt::format("{}", row.points), fmt::format("{}", row.rejected),
-                     fmt::format("{:.3f}", row.rms_px), fmt::format("{:.1f}", row.tilt_deg),
-                     fmt::format("{:.1f}", row.distance_mm), fmt::format("{:.2f}", row.blur_px), row.status},
-                    row.status == "ok" ? Colour::plain : Colour::warning);
-    } else {
-      table.add_row({row.name, "0", fmt::format("{}", row.rejected), "", "", "", "", row.status},
-                    Colour::bad);
-    }
+// What the printer made of the two 100 mm rulers: only their mean scales the sheet, what they differ by is
+// estimated with the sheet's shape.
+void apply_ruler(const std::string& text, std::vector<Sheet>& sheets) {
+  if (text.empty()) return;
+  const auto measured = paper_size(text);
+  const auto plausible = [](double mm) { return mm > 90 && mm < 110; };
+  if (!measured || !plausible(measured->width_mm) || !plausible(measured->height_mm)) {
+    throw InputError(fmt::format(
+        "--measured-ruler-mm: found '{}', wanted the two 100 mm rulers' lengths as in 99.4x99.7", text));
   }
-  fmt::print("{}\n", table.text());
-}
-
-void print_models(const CameraCalibration& calibration) {
-  TextTable table({"model", "unknowns", "AICc", "cross-validation_px", ""});
-  for (const ModelTrial& trial : calibration.trials) {
-    table.add_row({trial.name, fmt::format("{}", trial.unknowns), fmt::format("{:.1f}", trial.aicc),
-                   trial.cross_validation_px ? fmt::format("{:.4f}", *trial.cross_validation_px) : "",
-                   trial.chosen ? "chosen" : ""},
-                  trial.chosen ? Colour::bold : Colour::plain);
-  }
-  fmt::print("{}\n", table.text());
-}
-
-void print_parameters(const CameraModel& camera, const CameraReport& report) {
-  const auto& names = camera_parameter_names(camera.lens);
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    const auto at = static_cast<Eigen::Index>(i);
-    const double sigma = std::sqrt(report.covariance(at, at));
-    const bool pixels = i == 0 || i == 2 || i == 3;
-    if (sigma > 0) {
-      const std::string digits = pixels ? fmt::format("{:.3f} +- {:.3f}", camera.parameters[at], sigma)
-                                        : fmt::format("{:.6g} +- {:.2g}", camera.parameters[at], sigma);
-      fmt::print("{:<9} {}\n", names[i], digits);
-    } else if (camera.parameters[at] != 0) {
-      fmt::print("{:<9} {:.6g} (held)\n", names[i], camera.parameters[at]);
-    }
+  const double scale = std::sqrt(measured->width_mm * measured->height_mm) / 100;
+  for (Sheet& sheet : sheets) {
+    for (double* size : {&sheet.marker_mm, &sheet.spacing_mm, &sheet.pitch_mm, &sheet.dot_mm}) *size *= scale;
   }
 }
 
-void print_summary(const CameraCalibration& calibration, const CameraReport& report) {
-  const CameraQuality& q = report.quality;
-  print_parameters(calibration.fit.adjustment.state.camera, report);
-  fmt::print("\nrms_px {:.3f}   sigma0 {:.2f}   unexplained_px {:.3f}   points {}   photographs {}\n",
-             q.rms_px, q.sigma0, calibration.fit.extra_sigma_px, q.points, q.photographs);
+int compare(const Flags& flags) {
+  const CameraComparison result =
+      compare_cameras(read_camera_file(flags.compare[0]), read_camera_file(flags.compare[1]));
+  const ProjectionDifference& d = result.difference;
+  if (flags.json) {
+    const nlohmann::ordered_json out{{"difference_rms_px", d.rms_px},
+                                     {"difference_max_px", d.max_px},
+                                     {"expected_rms_px", result.expected_rms_px},
+                                     {"significant", result.significant}};
+    fmt::print("{}\n", out.dump(2));
+    return kDone;
+  }
   fmt::print(
-      "projection uncertainty: centre {:.4f} px, worst corner {:.4f} px; halves differ by {:.4f} px rms; "
-      "coverage "
-      "{:.0f} %\n",
-      q.uncertainty_centre_px, q.uncertainty_corner_px, q.cross_validation_px, q.coverage_percent);
-  if (!report.correlations.empty()) {
-    std::vector<std::string> pairs;
-    for (const CorrelatedPair& pair : report.correlations) {
-      pairs.push_back(fmt::format("{}-{} {:.3f}", pair.first, pair.second, pair.correlation));
+      "difference of projection over the frame, best rotation taken out, px (every fifth of the frame):\n");
+  for (int row = 0; row < d.rows; row += 4) {
+    for (int column = 0; column < d.columns; column += 5) {
+      fmt::print("{:8.4f}", d.difference_px[static_cast<std::size_t>(row * d.columns + column)].norm());
     }
-    fmt::print("correlations over 0.95: {}\n", fmt::join(pairs, ", "));
+    fmt::print("\n");
   }
+  fmt::print("rms {:.4f} px, largest {:.4f} px", d.rms_px, d.max_px);
+  if (result.expected_rms_px > 0) {
+    fmt::print("; expected from both uncertainties {:.4f} px rms: {}", result.expected_rms_px,
+               result.significant ? "the cameras differ significantly" : "no significant difference");
+  }
+  fmt::print("\n");
+  return kDone;
 }
 
-void print_verdict(const CameraReport& report) {
-  const CameraVerdict verdict = report.quality.verdict;
-  const Colour colour = verdict == CameraVerdict::good     ? Colour::good
-                        : verdict == CameraVerdict::usable ? Colour::warning
-                                                           : Colour::bad;
-  fmt::print("\nverdict: {}\n", coloured(camera_verdict_name(verdict), colour));
-  for (const Advice& advice : report.advice) fmt::print("  - {}\n", advice.words);
-}
-
-Json json_of(const CameraCalibration& calibration, const CameraReport& report) {
-  Json out;
-  out["verdict"] = camera_verdict_name(report.quality.verdict);
-  for (const Advice& advice : report.advice) out["advice"].push_back(advice.words);
-  for (const PhotographRow& row : report.photographs) {
-    out["photographs"].push_back({{"name", row.name},
-                                  {"status", row.status},
-                                  {"used", row.used},
-                                  {"points", row.points},
-                                  {"rejected", row.rejected},
-                                  {"rms_px", row.rms_px},
-                                  {"tilt_deg", row.tilt_deg},
-                                  {"distance_mm", row.distance_mm},
-                                  {"blur_px", row.blur_px}});
+// Writes everything asked for and returns the names.
+std::vector<std::string> write_files(const Flags& flags, const std::vector<Sheet>& sheets,
+                                     const MeasuredCamera& measured, const CameraReport& report) {
+  const CalibratedCamera camera{measured.calibration.fit.adjustment.state.camera, report.covariance,
+                                measured.setting, report.quality};
+  const std::string head = provenance_line(kVersion, "camera", flags.templates);
+  std::vector<fs::path> cameras;
+  if (!flags.output.empty()) cameras.push_back(flags.output);
+  if (!flags.library.empty())
+    cameras.push_back(flags.library / (setting_file_stem(measured.setting) + ".yaml"));
+  std::vector<std::string> written;
+  const auto write = [&written](const fs::path& path, const std::string& text) {
+    write_file_atomically(path, text);
+    written.push_back(path.string());
+  };
+  for (const fs::path& path : cameras) {
+    write(path, format_camera_file(head, camera));
+    write(fs::path(path).replace_extension(".inputs.csv"),
+          format_calibration_inputs(head, sheets, measured.photographs, measured.calibration));
   }
-  if (calibration.status != CalibrationStatus::ok) return out;
-  const CameraModel& camera = calibration.fit.adjustment.state.camera;
-  out["model"] = lens_model_name(camera.lens);
-  out["board"] = board_freedom_name(calibration.variant.board);
-  const auto& names = camera_parameter_names(camera.lens);
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    const auto at = static_cast<Eigen::Index>(i);
-    out["parameters"][names[i]] = {{"value", camera.parameters[at]},
-                                   {"sigma", std::sqrt(report.covariance(at, at))}};
-  }
-  const CameraQuality& q = report.quality;
-  out["rms_px"] = q.rms_px;
-  out["sigma0"] = q.sigma0;
-  out["unexplained_px"] = calibration.fit.extra_sigma_px;
-  out["points"] = q.points;
-  out["uncertainty_centre_px"] = q.uncertainty_centre_px;
-  out["uncertainty_corner_px"] = q.uncertainty_corner_px;
-  out["cross_validation_px"] = q.cross_validation_px;
-  out["coverage_percent"] = q.coverage_percent;
-  for (const ModelTrial& trial : calibration.trials) {
-    Json entry{
-        {"name", trial.name}, {"unknowns", trial.unknowns}, {"aicc", trial.aicc}, {"chosen", trial.chosen}};
-    if (trial.cross_validation_px) entry["cross_validation_px"] = *trial.cross_validation_px;
-    out["models"].push_back(entry);
-  }
-  return out;
+  if (!flags.poses.empty())
+    write(flags.poses, format_sheet_poses(head, measured.photographs, measured.calibration));
+  return written;
 }
 
 int run(const Flags& flags) {
-  const std::vector<Sheet> sheets = read_sheets(flags.templates);
+  if (!flags.compare.empty()) return compare(flags);
+  if (flags.images.empty()) throw InputError("IMAGES: wanted photographs or a folder of them");
+  if (flags.templates.empty()) throw InputError("--template: wanted the sheet.yaml of the printed sheet");
+  if (flags.output.empty() && flags.library.empty())
+    throw InputError("wanted -o camera.yaml or --library DIR");
+  std::vector<Sheet> sheets = read_sheets(flags.templates);
+  apply_ruler(flags.ruler, sheets);
   const std::vector<fs::path> paths = photograph_paths(flags.images);
-  const MeasuredCamera measured = measure_camera(paths, sheets, options_of(flags));
+  ProgressBar bar("measuring", 2 * paths.size());
+  const MeasuredCamera measured = measure_camera(paths, sheets, options_of(flags), [&bar] { bar.advance(); });
   const CameraCalibration& calibration = measured.calibration;
   const CameraReport report = report_calibration(sheets, measured.photographs, calibration);
   const bool done = calibration.status == CalibrationStatus::ok;
-  if (done) {
-    const CalibratedCamera camera{calibration.fit.adjustment.state.camera, report.covariance,
-                                  measured.setting, report.quality};
-    const std::string head = provenance_line(kVersion, "camera", flags.templates);
-    write_file_atomically(flags.output, format_camera_file(head, camera));
-  }
+  std::vector<std::string> written;
+  if (done) written = write_files(flags, sheets, measured, report);
   if (flags.json) {
-    fmt::print("{}\n", json_of(calibration, report).dump(2));
+    fmt::print("{}\n", camera_json(calibration, report));
   } else {
-    print_photographs(report);
-    if (done) {
-      print_models(calibration);
-      print_summary(calibration, report);
-    }
-    print_verdict(report);
-    if (done) fmt::print("\nwrote {}\n", flags.output.string());
+    fmt::print("{}", camera_tables(calibration, report));
+    if (done) fmt::print("\nwrote {}\n", fmt::join(written, ", "));
   }
   if (!done) throw InputError(calibration.reason);
   const bool some_failed = std::any_of(report.photographs.begin(), report.photographs.end(),
@@ -212,10 +210,16 @@ int run(const Flags& flags) {
 void add_camera_command(CLI::App& app, Action& action) {
   auto flags = std::make_shared<Flags>();
   CLI::App* command = app.add_subcommand("camera", kSynopsis);
-  command->add_option("IMAGES", flags->images, "photographs, or folders of them")->required();
-  command->add_option("--template", flags->templates, "sheet.yaml of the printed sheet; may be repeated")
-      ->required();
-  command->add_option("-o,--output", flags->output, "camera file to write")->required();
+  command->add_option("IMAGES", flags->images, "photographs, or folders of them");
+  command->add_option("--template", flags->templates, "sheet.yaml of the printed sheet; may be repeated");
+  command->add_option("-o,--output", flags->output, "camera file to write");
+  command->add_option("--library", flags->library, "folder in which to file the camera by its lens setting");
+  command->add_option("--poses", flags->poses,
+                      "CSV to write: the sheet's pose in every photograph with sigmas");
+  command->add_option("--compare", flags->compare, "two camera files to compare instead of calibrating")
+      ->expected(2);
+  command->add_option("--measured-ruler-mm", flags->ruler,
+                      "lengths of the printed 100 mm rulers, across x down, as in 99.4x99.7");
   command->add_option("--model", flags->lens, "lens model instead of the one chosen by evidence")
       ->check(CLI::IsMember({"brown", "rational", "radial"}));
   command

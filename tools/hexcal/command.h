@@ -24,5 +24,6 @@ void add_evaluate_command(CLI::App& app, Action& action);
 void add_completion_command(CLI::App& app, Action& action);
 void add_template_command(CLI::App& app, Action& action);
 void add_camera_command(CLI::App& app, Action& action);
+void add_export_command(CLI::App& app, Action& action);
 
 }  // namespace hexcal

@@ -1,17 +1,13 @@
-#include "tools/hexcal/camera_photographs.h"
+#include "camera_calib/measure_camera.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 
 #include "camera_calib/detect_sheets.h"
-#include "kinematics/geometry/input_error.h"
-#include "tools/hexcal/terminal.h"
 
 namespace hexcal {
 namespace {
@@ -20,14 +16,6 @@ namespace fs = std::filesystem;
 
 // Pixels kept in memory between the two measurements; beyond, photographs are read twice.
 constexpr std::size_t kKeptBytes = std::size_t{1} << 31;
-
-bool is_photograph(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  static const std::set<std::string> known{".jpg", ".jpeg", ".png", ".tif", ".tiff", ".nef", ".dng"};
-  return known.count(extension) > 0;
-}
 
 // Photographs kept in memory; those that do not fit are read again.
 class Pixels {
@@ -124,63 +112,33 @@ LensSetting common_setting(const std::vector<SheetPhotograph>& photographs,
 
 }  // namespace
 
-std::vector<fs::path> photograph_paths(const std::vector<fs::path>& given) {
-  std::vector<fs::path> out;
-  for (const fs::path& path : given) {
-    std::error_code error;
-    if (!fs::is_directory(path, error)) {
-      if (!fs::exists(path, error))
-        throw InputError(fmt::format("{}: no such file or folder", path.string()));
-      out.push_back(path);
-      continue;
-    }
-    std::vector<fs::path> found;
-    for (const auto& entry : fs::directory_iterator(path)) {
-      if (entry.is_regular_file() && is_photograph(entry.path())) found.push_back(entry.path());
-    }
-    if (found.empty()) {
-      throw InputError(
-          fmt::format("{}: holds no photograph (jpg, jpeg, png, tif, tiff, nef, dng)", path.string()));
-    }
-    std::sort(found.begin(), found.end());
-    out.insert(out.end(), found.begin(), found.end());
-  }
-  return out;
-}
-
 MeasuredCamera measure_camera(const std::vector<fs::path>& paths, const std::vector<Sheet>& sheets,
-                              const CalibrateOptions& options) {
+                              const CalibrateOptions& options, const std::function<void()>& on_photograph) {
   MeasuredCamera out;
   out.photographs.resize(paths.size());
   Pixels pixels(paths);
-  {
-    ProgressBar bar("measuring", paths.size());
-    tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t i) {
-      Photograph photograph;
-      out.photographs[i] = measure(paths[i], sheets, photograph);
-      if (photograph.status == PhotographStatus::ok) pixels.keep(i, std::move(photograph));
-      bar.advance();
-    });
-  }
+  tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t i) {
+    Photograph photograph;
+    out.photographs[i] = measure(paths[i], sheets, photograph);
+    if (photograph.status == PhotographStatus::ok) pixels.keep(i, std::move(photograph));
+    if (on_photograph) on_photograph();
+  });
   leave_out_other_settings(out.photographs);
   out.calibration = rough_calibration(sheets, out.photographs, options);
   if (out.calibration.status != CalibrationStatus::ok) return out;
   const CalibrationState& rough = out.calibration.fit.adjustment.state;
-  {
-    ProgressBar bar("refining", paths.size());
-    tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t i) {
-      std::vector<SheetView> views;
-      for (const SheetView& view : rough.views) {
-        if (view.photograph == static_cast<int>(i)) views.push_back(view);
-      }
-      if (!views.empty()) {
-        const Photograph photograph = pixels.get(i);
-        out.photographs[i].features =
-            refine_sheets(photograph.grey, photograph.tone, sheets, rough.shapes, rough.camera, views);
-      }
-      bar.advance();
-    });
-  }
+  tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t i) {
+    std::vector<SheetView> views;
+    for (const SheetView& view : rough.views) {
+      if (view.photograph == static_cast<int>(i)) views.push_back(view);
+    }
+    if (!views.empty()) {
+      const Photograph photograph = pixels.get(i);
+      out.photographs[i].features =
+          refine_sheets(photograph.grey, photograph.tone, sheets, rough.shapes, rough.camera, views);
+    }
+    if (on_photograph) on_photograph();
+  });
   out.calibration = calibrate_camera(sheets, with_features(rough, out.photographs),
                                      std::max(out.calibration.fit.extra_sigma_px, 0.02), options);
   out.setting = common_setting(out.photographs, out.calibration);

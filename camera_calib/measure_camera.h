@@ -1,17 +1,13 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <vector>
 
 #include "camera_calib/calibrate_camera.h"
-#include "camera_calib/camera_report.h"
+#include "camera_calib/lens_setting.h"
 
 namespace hexcal {
-
-/// The photographs named on the command line: files as given, folders replaced by the photographs in them,
-/// sorted. Throws InputError for a path that does not exist or a folder without photographs.
-[[nodiscard]] std::vector<std::filesystem::path> photograph_paths(
-    const std::vector<std::filesystem::path>& given);
 
 /// What reading, detecting and calibrating gave.
 struct MeasuredCamera {
@@ -25,6 +21,7 @@ struct MeasuredCamera {
 /// are left out with their reason.
 [[nodiscard]] MeasuredCamera measure_camera(const std::vector<std::filesystem::path>& paths,
                                             const std::vector<Sheet>& sheets,
-                                            const CalibrateOptions& options);
+                                            const CalibrateOptions& options = {},
+                                            const std::function<void()>& on_photograph = {});
 
 }  // namespace hexcal
