@@ -11,6 +11,7 @@
 #include "camera_calib/find_chessboard.h"
 #include "camera_calib/find_dots.h"
 #include "camera_calib/initial_camera.h"
+#include "camera_calib/measure_point.h"
 #include "camera_calib/robust_fit.h"
 #include "photogrammetry/markers/detect.h"
 #include "photogrammetry/markers/refine.h"
@@ -95,7 +96,7 @@ class PredictedSheet {
   SheetGeometry geometry_;
 };
 
-void measure_saddles(const cv::Mat& grey, ToneCurve tone, const PredictedSheet& predicted, int sheet,
+void measure_saddles(const cv::Mat& grey, const PredictedSheet& predicted, int sheet,
                      const Sheet& description, std::vector<FeatureObservation>& out) {
   const int first = predicted.first_saddle();
   const int count = static_cast<int>(predicted.geometry().saddles.size());
@@ -110,11 +111,11 @@ void measure_saddles(const cv::Mat& grey, ToneCurve tone, const PredictedSheet& 
     if (!px || !(x || x_back) || !(y || y_back)) continue;
     const Eigen::Vector2d to_x = x ? *x - *px : *px - *x_back;
     const Eigen::Vector2d to_y = y ? *y - *px : *px - *y_back;
-    out.push_back(from_point(refine_saddle(grey, tone, *px, to_x, to_y), sheet, first + i));
+    out.push_back(from_point(measure_saddle(grey, *px, to_x, to_y), sheet, first + i));
   }
 }
 
-void measure_dots(const cv::Mat& grey, ToneCurve tone, const PredictedSheet& predicted, int sheet,
+void measure_dots(const cv::Mat& grey, const PredictedSheet& predicted, int sheet,
                   std::vector<FeatureObservation>& out) {
   const int first = predicted.first_dot();
   for (std::size_t i = 0; i < predicted.geometry().dots.size(); ++i) {
@@ -126,7 +127,7 @@ void measure_dots(const cv::Mat& grey, ToneCurve tone, const PredictedSheet& pre
     }
     const auto homography = predicted.local_homography(point, radius);
     if (!homography) continue;
-    out.push_back(from_point(refine_dot(grey, tone, *homography, point.head<2>(), radius), sheet,
+    out.push_back(from_point(measure_dot(grey, *homography, point.head<2>(), radius), sheet,
                              first + static_cast<int>(i)));
   }
 }
@@ -135,8 +136,7 @@ bool has_saddles_or_dots(const Sheet& sheet) {
   return sheet.kind == SheetKind::charuco || sheet.kind == SheetKind::dots;
 }
 
-void detect_chessboard(const cv::Mat& grey, ToneCurve tone, const Sheet& sheet, int index,
-                       SheetDetection& out) {
+void detect_chessboard(const cv::Mat& grey, const Sheet& sheet, int index, SheetDetection& out) {
   const std::vector<Eigen::Vector2d> corners = find_chessboard(grey, sheet);
   if (corners.empty()) {
     out.reason = "the whole chessboard was not found";
@@ -152,7 +152,7 @@ void detect_chessboard(const cv::Mat& grey, ToneCurve tone, const Sheet& sheet, 
       const Eigen::Vector2d at = corner(c, r);
       const Eigen::Vector2d to_x = c + 1 < columns ? corner(c + 1, r) - at : at - corner(c - 1, r);
       const Eigen::Vector2d to_y = r + 1 < rows ? corner(c, r + 1) - at : at - corner(c, r - 1);
-      out.features.push_back(from_point(refine_saddle(grey, tone, at, to_x, to_y), index, r * columns + c));
+      out.features.push_back(from_point(measure_saddle(grey, at, to_x, to_y), index, r * columns + c));
     }
   }
 }
@@ -171,8 +171,7 @@ std::optional<Eigen::Matrix3d> homography_around(const std::vector<SheetDot>& do
   return sheet.size() >= 6 ? homography_from_points(sheet, image) : std::nullopt;
 }
 
-void detect_ringed_dots(const cv::Mat& grey, ToneCurve tone, const Sheet& sheet, int index,
-                        SheetDetection& out) {
+void detect_ringed_dots(const cv::Mat& grey, const Sheet& sheet, int index, SheetDetection& out) {
   const std::vector<std::optional<Eigen::Vector2d>> found = find_ringed_dots(grey, sheet);
   if (found.empty()) {
     out.reason = "the four ringed dots were not found";
@@ -184,7 +183,7 @@ void detect_ringed_dots(const cv::Mat& grey, ToneCurve tone, const Sheet& sheet,
     const auto homography = homography_around(dots, found, i, 2.3 * sheet.pitch_mm);
     if (!homography) continue;
     out.features.push_back(
-        from_point(refine_dot(grey, tone, *homography, dots[i].centre_mm, 0.5 * dots[i].diameter_mm), index,
+        from_point(measure_dot(grey, *homography, dots[i].centre_mm, 0.5 * dots[i].diameter_mm), index,
                    static_cast<int>(i)));
   }
 }
@@ -212,8 +211,7 @@ void detect_family(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>
 }
 
 // Saddles of charucos and dots at the places that the sheet's own markers predict.
-void add_predicted(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>& sheets,
-                   SheetDetection& out) {
+void add_predicted(const cv::Mat& grey, const std::vector<Sheet>& sheets, SheetDetection& out) {
   SheetPhotograph alone;
   alone.features = out.features;
   const CalibrationState start = initial_state(sheets, {alone}, grey.cols, grey.rows, std::nullopt);
@@ -224,8 +222,8 @@ void add_predicted(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>
     const Sheet& sheet = sheets[static_cast<std::size_t>(view.sheet)];
     if (!has_saddles_or_dots(sheet)) continue;
     const PredictedSheet predicted(sheet, {}, fit.adjustment.state.camera, view.camera_from_sheet);
-    measure_saddles(grey, tone, predicted, view.sheet, sheet, out.features);
-    measure_dots(grey, tone, predicted, view.sheet, out.features);
+    measure_saddles(grey, predicted, view.sheet, sheet, out.features);
+    measure_dots(grey, predicted, view.sheet, out.features);
   }
 }
 
@@ -252,16 +250,15 @@ SheetDetection detect_sheets(const cv::Mat& grey, ToneCurve tone, const std::vec
   SheetDetection out;
   std::set<std::string> families;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
-    if (sheets[s].kind == SheetKind::chessboard)
-      detect_chessboard(grey, tone, sheets[s], static_cast<int>(s), out);
+    if (sheets[s].kind == SheetKind::chessboard) detect_chessboard(grey, sheets[s], static_cast<int>(s), out);
     if (sheets[s].kind == SheetKind::photomodeler) {
-      detect_ringed_dots(grey, tone, sheets[s], static_cast<int>(s), out);
+      detect_ringed_dots(grey, sheets[s], static_cast<int>(s), out);
     }
     if (!sheets[s].family.empty()) families.insert(sheets[s].family);
   }
   for (const std::string& family : families) detect_family(grey, tone, sheets, family, out);
   sort_features(out.features);
-  if (std::any_of(sheets.begin(), sheets.end(), has_saddles_or_dots)) add_predicted(grey, tone, sheets, out);
+  if (std::any_of(sheets.begin(), sheets.end(), has_saddles_or_dots)) add_predicted(grey, sheets, out);
   prefer_saddles(sheets, out.features);
   sort_features(out.features);
   if (std::none_of(out.features.begin(), out.features.end(), usable) && out.reason.empty()) {
@@ -296,8 +293,8 @@ std::vector<FeatureObservation> refine_sheets(const cv::Mat& grey, ToneCurve ton
     for (auto& feature : measured) {
       if (feature) out.push_back(std::move(*feature));
     }
-    measure_saddles(grey, tone, predicted, view.sheet, sheet, out);
-    measure_dots(grey, tone, predicted, view.sheet, out);
+    measure_saddles(grey, predicted, view.sheet, sheet, out);
+    measure_dots(grey, predicted, view.sheet, out);
   }
   prefer_saddles(sheets, out);
   sort_features(out);

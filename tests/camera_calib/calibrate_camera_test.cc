@@ -19,7 +19,8 @@ const std::vector<Sheet>& sheets() {
   return all;
 }
 
-CameraCalibration calibrate(const std::vector<SheetPhotograph>& photographs, const CalibrateOptions& options = {}) {
+CameraCalibration calibrate(const std::vector<SheetPhotograph>& photographs,
+                            const CalibrateOptions& options = {}) {
   const CameraCalibration rough = rough_calibration(sheets(), photographs, options);
   if (rough.status != CalibrationStatus::ok) return rough;
   return calibrate_camera(sheets(), rough.fit.adjustment.state, rough.fit.extra_sigma_px, options);
@@ -75,7 +76,8 @@ TEST(CalibrateCamera, ReportSaysWhatATechnicianCanDo) {
   // Every tag of the lower left of the frame missing.
   photographs = synthetic_photographs(sheets()[0], at_35_mm());
   for (SheetPhotograph& photograph : photographs) {
-    std::erase_if(photograph.features, [](const FeatureObservation& f) { return f.px[0] < 1500 && f.px[1] > 2900; });
+    std::erase_if(photograph.features,
+                  [](const FeatureObservation& f) { return f.px[0] < 1500 && f.px[1] > 2900; });
     for (FeatureObservation& f : photograph.features) f.blur_px = photograph.name == "photo5" ? 2.4 : 0.7;
   }
   report = report_calibration(sheets(), photographs, calibrate(photographs));
@@ -92,7 +94,8 @@ TEST(CalibrateCamera, AWrongTagSizeIsNamed) {
   wrong[0].spacing_mm = 15.8;
   const CameraCalibration rough = rough_calibration(wrong, photographs);
   ASSERT_EQ(rough.status, CalibrationStatus::ok);
-  const CameraCalibration calibration = calibrate_camera(wrong, rough.fit.adjustment.state, rough.fit.extra_sigma_px);
+  const CameraCalibration calibration =
+      calibrate_camera(wrong, rough.fit.adjustment.state, rough.fit.extra_sigma_px);
   const CameraReport report = report_calibration(wrong, photographs, calibration);
   EXPECT_THAT(words(report), testing::HasSubstr("larger for their spacing than the template says"));
 }
