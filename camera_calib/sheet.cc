@@ -1,7 +1,6 @@
 #include "camera_calib/sheet.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -26,6 +25,19 @@ int ring_arcs(const Sheet& sheet, int column, int row) {
   const bool top = row == 1;
   if (!(left || column == sheet.columns - 2) || !(top || row == sheet.rows - 2)) return 0;
   return (top ? 3 : 1) + (left ? 1 : 0);
+}
+
+// "0-9 100-109"
+std::string id_ranges(const std::vector<int>& ids) {
+  std::string text;
+  for (std::size_t i = 0; i < ids.size();) {
+    std::size_t j = i;
+    while (j + 1 < ids.size() && ids[j + 1] == ids[j] + 1) ++j;
+    text += fmt::format("{}{}", text.empty() ? "" : " ", ids[i]);
+    if (j > i) text += fmt::format("-{}", ids[j]);
+    i = j + 1;
+  }
+  return text;
 }
 
 bool is_black(const Sheet& sheet, int column, int row) {
@@ -234,8 +246,7 @@ std::string describe_sheet(const Sheet& sheet) {
       return fmt::format("dots {}, pitch {:g} mm, dots {:g} mm, markers {} {:g} mm{}", grid, sheet.pitch_mm,
                          sheet.dot_mm, sheet.family, sheet.marker_mm, ids);
     case SheetKind::markers:
-      return fmt::format("markers {}, {:g} mm, ids {}", sheet.family, sheet.marker_mm,
-                         fmt::join(sheet.ids, " "));
+      return fmt::format("markers {}, {:g} mm, ids {}", sheet.family, sheet.marker_mm, id_ranges(sheet.ids));
     case SheetKind::photomodeler:
       return fmt::format("photomodeler {} dots, pitch {:g} mm, dots {:g} mm", grid, sheet.pitch_mm,
                          sheet.dot_mm);

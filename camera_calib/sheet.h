@@ -61,8 +61,12 @@ struct SheetSquare {
   double size_mm = 0;
 };
 
-/// A filled black circle. PhotoModeler's ringed dots have a broken ring around them, from 1.3 to 2.1 dot
-/// diameters from the centre, whose number of arcs (1 to 4) tells them apart.
+/// PhotoModeler's rings, from inner to outer radius in diameters of their dot.
+inline constexpr double kRingInner = 1.3;
+inline constexpr double kRingOuter = 2.1;
+
+/// A filled black circle. PhotoModeler's ringed dots have a broken ring around them, whose number of arcs (1
+/// to 4) tells them apart.
 struct SheetDot {
   int column = 0, row = 0;
   Eigen::Vector2d centre_mm = Eigen::Vector2d::Zero();

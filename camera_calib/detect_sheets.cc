@@ -1,0 +1,304 @@
+#include "camera_calib/detect_sheets.h"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <set>
+#include <tuple>
+
+#include "camera_calib/find_chessboard.h"
+#include "camera_calib/find_dots.h"
+#include "camera_calib/initial_camera.h"
+#include "camera_calib/measure_point.h"
+#include "camera_calib/robust_fit.h"
+#include "photogrammetry/markers/detect.h"
+#include "photogrammetry/markers/refine.h"
+
+namespace hexcal {
+namespace {
+
+constexpr double kFrameMarginPx = 3;
+
+FeatureObservation from_marker(const MarkerObservation& marker, int sheet, int first_point) {
+  FeatureObservation feature;
+  feature.sheet = sheet;
+  feature.first_point = first_point;
+  feature.status = marker.status;
+  feature.px.resize(8);
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    feature.px.segment<2>(2 * i) = marker.corners_px[static_cast<std::size_t>(i)];
+  }
+  feature.covariance_px2 = marker.covariance_px2;
+  feature.blur_px = marker.blur_px;
+  feature.chi2_per_dof = marker.chi2_per_dof;
+  return feature;
+}
+
+FeatureObservation from_point(const PointObservation& point, int sheet, int first_point) {
+  FeatureObservation feature;
+  feature.sheet = sheet;
+  feature.first_point = first_point;
+  feature.status = point.status;
+  feature.px = point.px;
+  feature.covariance_px2 = point.covariance_px2;
+  feature.blur_px = point.blur_px;
+  feature.chi2_per_dof = point.chi2_per_dof;
+  return feature;
+}
+
+void sort_features(std::vector<FeatureObservation>& features) {
+  std::sort(features.begin(), features.end(), [](const FeatureObservation& a, const FeatureObservation& b) {
+    return std::tie(a.sheet, a.first_point) < std::tie(b.sheet, b.first_point);
+  });
+}
+
+// Pixels of all points of a sheet in one view; none outside the frame.
+class PredictedSheet {
+ public:
+  PredictedSheet(const Sheet& sheet, const SheetShape& shape, const CameraModel& camera, const Rigid3& pose)
+      : camera_(camera),
+        pose_(pose),
+        points_mm_(shaped_points(sheet, shape)),
+        geometry_(sheet_geometry(sheet)) {}
+
+  [[nodiscard]] std::optional<Eigen::Vector2d> at(const Eigen::Vector3d& point_mm) const {
+    const auto px = camera_.project(pose_ * point_mm);
+    return px && camera_.contains(*px, kFrameMarginPx) ? px : std::nullopt;
+  }
+  [[nodiscard]] const std::vector<Eigen::Vector3d>& points_mm() const { return points_mm_; }
+  [[nodiscard]] const SheetGeometry& geometry() const { return geometry_; }
+  [[nodiscard]] int first_saddle() const { return 4 * static_cast<int>(geometry_.markers.size()); }
+  [[nodiscard]] int first_dot() const { return first_saddle() + static_cast<int>(geometry_.saddles.size()); }
+
+  // Homography of the sheet's plane near a point, the lens linearised into it.
+  [[nodiscard]] std::optional<Eigen::Matrix3d> local_homography(const Eigen::Vector3d& centre_mm,
+                                                                double radius_mm) const {
+    std::vector<Eigen::Vector2d> sheet;
+    std::vector<Eigen::Vector2d> image;
+    for (const double x : {-1.0, 0.0, 1.0}) {
+      for (const double y : {-1.0, 0.0, 1.0}) {
+        const Eigen::Vector3d point = centre_mm + 1.5 * radius_mm * Eigen::Vector3d(x, y, 0);
+        const auto px = camera_.project(pose_ * point);
+        if (!px) return std::nullopt;
+        sheet.emplace_back(point.head<2>());
+        image.push_back(*px);
+      }
+    }
+    return homography_from_points(sheet, image);
+  }
+
+ private:
+  const CameraModel& camera_;
+  const Rigid3& pose_;
+  std::vector<Eigen::Vector3d> points_mm_;
+  SheetGeometry geometry_;
+};
+
+void measure_saddles(const cv::Mat& grey, const PredictedSheet& predicted, int sheet,
+                     const Sheet& description, std::vector<FeatureObservation>& out) {
+  const int first = predicted.first_saddle();
+  const int count = static_cast<int>(predicted.geometry().saddles.size());
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Vector3d& point = predicted.points_mm()[static_cast<std::size_t>(first + i)];
+    const double reach = description.pitch_mm;
+    const auto px = predicted.at(point);
+    const auto x = predicted.at(point + Eigen::Vector3d(reach, 0, 0));
+    const auto y = predicted.at(point - Eigen::Vector3d(0, reach, 0));
+    const auto x_back = predicted.at(point - Eigen::Vector3d(reach, 0, 0));
+    const auto y_back = predicted.at(point + Eigen::Vector3d(0, reach, 0));
+    if (!px || !(x || x_back) || !(y || y_back)) continue;
+    const Eigen::Vector2d to_x = x ? *x - *px : *px - *x_back;
+    const Eigen::Vector2d to_y = y ? *y - *px : *px - *y_back;
+    out.push_back(from_point(measure_saddle(grey, *px, to_x, to_y), sheet, first + i));
+  }
+}
+
+void measure_dots(const cv::Mat& grey, const PredictedSheet& predicted, int sheet,
+                  std::vector<FeatureObservation>& out) {
+  const int first = predicted.first_dot();
+  for (std::size_t i = 0; i < predicted.geometry().dots.size(); ++i) {
+    const double radius = 0.5 * predicted.geometry().dots[i].diameter_mm;
+    const Eigen::Vector3d& point = predicted.points_mm()[static_cast<std::size_t>(first) + i];
+    if (!predicted.at(point + Eigen::Vector3d(radius, radius, 0)) ||
+        !predicted.at(point - Eigen::Vector3d(radius, radius, 0))) {
+      continue;
+    }
+    const auto homography = predicted.local_homography(point, radius);
+    if (!homography) continue;
+    out.push_back(from_point(measure_dot(grey, *homography, point.head<2>(), radius), sheet,
+                             first + static_cast<int>(i)));
+  }
+}
+
+bool has_saddles_or_dots(const Sheet& sheet) {
+  return sheet.kind == SheetKind::charuco || sheet.kind == SheetKind::dots;
+}
+
+void detect_chessboard(const cv::Mat& grey, const Sheet& sheet, int index, SheetDetection& out) {
+  const std::vector<Eigen::Vector2d> corners = find_chessboard(grey, sheet);
+  if (corners.empty()) {
+    out.reason = "the whole chessboard was not found";
+    return;
+  }
+  const int columns = sheet.columns - 1;
+  const int rows = sheet.rows - 1;
+  const auto corner = [&corners, columns](int c, int r) {
+    return corners[static_cast<std::size_t>(r * columns + c)];
+  };
+  for (int r = 0; r < rows; ++r) {
+    for (int c = 0; c < columns; ++c) {
+      const Eigen::Vector2d at = corner(c, r);
+      const Eigen::Vector2d to_x = c + 1 < columns ? corner(c + 1, r) - at : at - corner(c - 1, r);
+      const Eigen::Vector2d to_y = r + 1 < rows ? corner(c, r + 1) - at : at - corner(c, r - 1);
+      out.features.push_back(from_point(measure_saddle(grey, at, to_x, to_y), index, r * columns + c));
+    }
+  }
+}
+
+// Homography of the sheet's plane near dot `at` from the dots found around it.
+std::optional<Eigen::Matrix3d> homography_around(const std::vector<SheetDot>& dots,
+                                                 const std::vector<std::optional<Eigen::Vector2d>>& found,
+                                                 std::size_t at, double reach_mm) {
+  std::vector<Eigen::Vector2d> sheet;
+  std::vector<Eigen::Vector2d> image;
+  for (std::size_t i = 0; i < dots.size(); ++i) {
+    if (!found[i] || (dots[i].centre_mm - dots[at].centre_mm).norm() > reach_mm) continue;
+    sheet.push_back(dots[i].centre_mm);
+    image.push_back(*found[i]);
+  }
+  return sheet.size() >= 6 ? homography_from_points(sheet, image) : std::nullopt;
+}
+
+void detect_ringed_dots(const cv::Mat& grey, const Sheet& sheet, int index, SheetDetection& out) {
+  const std::vector<std::optional<Eigen::Vector2d>> found = find_ringed_dots(grey, sheet);
+  if (found.empty()) {
+    out.reason = "the four ringed dots were not found";
+    return;
+  }
+  const std::vector<SheetDot> dots = sheet_geometry(sheet).dots;
+  for (std::size_t i = 0; i < dots.size(); ++i) {
+    if (!found[i]) continue;
+    const auto homography = homography_around(dots, found, i, 2.3 * sheet.pitch_mm);
+    if (!homography) continue;
+    out.features.push_back(
+        from_point(measure_dot(grey, *homography, dots[i].centre_mm, 0.5 * dots[i].diameter_mm), index,
+                   static_cast<int>(i)));
+  }
+}
+
+// Markers of all sheets of one family.
+void detect_family(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>& sheets,
+                   const std::string& family, SheetDetection& out) {
+  std::map<int, std::pair<int, int>> places;  // id -> sheet, first point
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    if (sheets[s].family != family) continue;
+    int first = 0;
+    for (const SheetMarker& marker : sheet_geometry(sheets[s]).markers) {
+      places[marker.id] = {static_cast<int>(s), first};
+      first += 4;
+    }
+  }
+  for (const MarkerObservation& marker : detect_markers(grey, tone, marker_family(family))) {
+    const auto place = places.find(marker.id);
+    if (place == places.end()) {
+      if (marker.status == MarkerStatus::ok) out.foreign_ids.push_back(marker.id);
+    } else {
+      out.features.push_back(from_marker(marker, place->second.first, place->second.second));
+    }
+  }
+}
+
+// Saddles of charucos and dots at the places that the sheet's own markers predict.
+void add_predicted(const cv::Mat& grey, const std::vector<Sheet>& sheets, SheetDetection& out) {
+  SheetPhotograph alone;
+  alone.features = out.features;
+  const CalibrationState start = initial_state(sheets, {alone}, grey.cols, grey.rows, std::nullopt);
+  if (start.views.empty()) return;
+  const RobustFitResult fit = first_fit(sheets, start);
+  if (!fit.adjustment.converged) return;
+  for (const SheetView& view : fit.adjustment.state.views) {
+    const Sheet& sheet = sheets[static_cast<std::size_t>(view.sheet)];
+    if (!has_saddles_or_dots(sheet)) continue;
+    const PredictedSheet predicted(sheet, {}, fit.adjustment.state.camera, view.camera_from_sheet);
+    measure_saddles(grey, predicted, view.sheet, sheet, out.features);
+    measure_dots(grey, predicted, view.sheet, out.features);
+  }
+}
+
+bool usable(const FeatureObservation& feature) { return feature.status == MarkerStatus::ok; }
+
+// A charuco's saddles are free of the edge bleed that moves its markers' corners: with enough of them the
+// markers only identify.
+void prefer_saddles(const std::vector<Sheet>& sheets, std::vector<FeatureObservation>& features) {
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    if (sheets[s].kind != SheetKind::charuco) continue;
+    const auto is_saddle = [s](const FeatureObservation& f) {
+      return f.sheet == static_cast<int>(s) && f.points() == 1 && usable(f);
+    };
+    if (std::count_if(features.begin(), features.end(), is_saddle) < 6) continue;
+    std::erase_if(features, [s](const FeatureObservation& f) {
+      return f.sheet == static_cast<int>(s) && f.points() == 4;
+    });
+  }
+}
+
+}  // namespace
+
+SheetDetection detect_sheets(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>& sheets) {
+  SheetDetection out;
+  std::set<std::string> families;
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    if (sheets[s].kind == SheetKind::chessboard) detect_chessboard(grey, sheets[s], static_cast<int>(s), out);
+    if (sheets[s].kind == SheetKind::photomodeler) {
+      detect_ringed_dots(grey, sheets[s], static_cast<int>(s), out);
+    }
+    if (!sheets[s].family.empty()) families.insert(sheets[s].family);
+  }
+  for (const std::string& family : families) detect_family(grey, tone, sheets, family, out);
+  sort_features(out.features);
+  if (std::any_of(sheets.begin(), sheets.end(), has_saddles_or_dots)) add_predicted(grey, sheets, out);
+  prefer_saddles(sheets, out.features);
+  sort_features(out.features);
+  if (std::none_of(out.features.begin(), out.features.end(), usable) && out.reason.empty()) {
+    out.reason = out.features.empty() ? "no sheet was found" : "no feature of the sheet can be measured";
+  }
+  return out;
+}
+
+std::vector<FeatureObservation> refine_sheets(const cv::Mat& grey, ToneCurve tone,
+                                              const std::vector<Sheet>& sheets,
+                                              const std::vector<SheetShape>& shapes,
+                                              const CameraModel& camera,
+                                              const std::vector<SheetView>& views) {
+  std::vector<FeatureObservation> out;
+  for (const SheetView& view : views) {
+    const Sheet& sheet = sheets[static_cast<std::size_t>(view.sheet)];
+    const PredictedSheet predicted(sheet, shapes[static_cast<std::size_t>(view.sheet)], camera,
+                                   view.camera_from_sheet);
+    const std::vector<SheetMarker>& markers = predicted.geometry().markers;
+    std::vector<std::optional<FeatureObservation>> measured(markers.size());
+    tbb::parallel_for(std::size_t{0}, markers.size(), [&](std::size_t m) {
+      std::array<Eigen::Vector2d, 4> corners;
+      for (std::size_t i = 0; i < 4; ++i) {
+        const auto px = predicted.at(predicted.points_mm()[4 * m + i]);
+        if (!px) return;
+        corners[i] = *px;
+      }
+      const auto& pattern = marker_family(sheet.family).patterns[static_cast<std::size_t>(markers[m].id)];
+      const MarkerObservation marker = refine_marker(grey, tone, pattern, corners, {}, &camera);
+      measured[m] = from_marker(marker, view.sheet, 4 * static_cast<int>(m));
+    });
+    for (auto& feature : measured) {
+      if (feature) out.push_back(std::move(*feature));
+    }
+    measure_saddles(grey, predicted, view.sheet, sheet, out);
+    measure_dots(grey, predicted, view.sheet, out);
+  }
+  prefer_saddles(sheets, out);
+  sort_features(out);
+  return out;
+}
+
+}  // namespace hexcal

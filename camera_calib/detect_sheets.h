@@ -1,0 +1,34 @@
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <vector>
+
+#include "camera_calib/sheet_adjustment.h"
+#include "camera_calib/sheet_observation.h"
+#include "photogrammetry/photograph/photograph.h"
+
+namespace hexcal {
+
+struct SheetDetection {
+  std::vector<FeatureObservation>
+      features;                  ///< ordered by sheet and point; with a status other than ok if unusable
+  std::vector<int> foreign_ids;  ///< ids read that stand on none of the sheets
+  std::string reason;            ///< why nothing usable was found
+};
+
+/// Finds all sheets in a photograph. Sheets with markers may be seen in part and together; a chessboard must
+/// be wholly in view, turned as it likes. `grey` is CV_8UC1 or CV_16UC1. Without a camera each photograph's
+/// own markers give the lens that is needed to find saddles and dots. Runs in the caller's TBB arena.
+[[nodiscard]] SheetDetection detect_sheets(const cv::Mat& grey, ToneCurve tone,
+                                           const std::vector<Sheet>& sheets);
+
+/// Measures again, now with the camera's lens inside the photometric model and at every place where the views
+/// predict a feature, found before or not.
+[[nodiscard]] std::vector<FeatureObservation> refine_sheets(const cv::Mat& grey, ToneCurve tone,
+                                                            const std::vector<Sheet>& sheets,
+                                                            const std::vector<SheetShape>& shapes,
+                                                            const CameraModel& camera,
+                                                            const std::vector<SheetView>& views);
+
+}  // namespace hexcal

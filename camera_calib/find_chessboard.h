@@ -1,0 +1,17 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "camera_calib/sheet.h"
+
+namespace hexcal {
+
+/// Approximate pixels (about 1 px) of a chessboard's inner corners in the order of SheetGeometry::saddles;
+/// empty if the whole board is not found. The order is that of the print: the top-left square is black. A
+/// board that looks the same after half a turn is taken with its x axis to the right (or downwards if it
+/// stands on end).
+[[nodiscard]] std::vector<Eigen::Vector2d> find_chessboard(const cv::Mat& grey, const Sheet& sheet);
+
+}  // namespace hexcal

@@ -1,0 +1,148 @@
+#include "camera_calib/measure_camera.h"
+
+#include <fmt/format.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "camera_calib/detect_sheets.h"
+
+namespace hexcal {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Pixels kept in memory between the two measurements; beyond, photographs are read twice.
+constexpr std::size_t kKeptBytes = std::size_t{1} << 31;
+
+// Photographs kept in memory; those that do not fit are read again.
+class Pixels {
+ public:
+  explicit Pixels(const std::vector<fs::path>& paths) : paths_(paths), kept_(paths.size()) {}
+
+  void keep(std::size_t i, Photograph&& photograph) {
+    const std::size_t bytes = photograph.grey.total() * photograph.grey.elemSize();
+    if (bytes * paths_.size() <= kKeptBytes) kept_[i] = std::move(photograph);
+  }
+  [[nodiscard]] Photograph get(std::size_t i) {
+    return kept_[i].grey.empty() ? read_photograph(paths_[i]) : std::move(kept_[i]);
+  }
+
+ private:
+  const std::vector<fs::path>& paths_;
+  std::vector<Photograph> kept_;
+};
+
+SheetPhotograph measure(const fs::path& path, const std::vector<Sheet>& sheets, Photograph& photograph) {
+  photograph = read_photograph(path);
+  SheetPhotograph out;
+  out.name = path.filename().string();
+  out.status = photograph.status;
+  out.reason = photograph.reason;
+  out.info = photograph.info;
+  out.sha256 = photograph.sha256;
+  if (photograph.status != PhotographStatus::ok) return out;
+  out.info.width_px = photograph.grey.cols;
+  out.info.height_px = photograph.grey.rows;
+  SheetDetection detection = detect_sheets(photograph.grey, photograph.tone, sheets);
+  out.features = std::move(detection.features);
+  out.reason = detection.reason;
+  if (!detection.foreign_ids.empty() && detection.foreign_ids.size() * 4 > out.features.size()) {
+    const auto [least, most] =
+        std::minmax_element(detection.foreign_ids.begin(), detection.foreign_ids.end());
+    out.reason =
+        fmt::format("ids {} to {} are on no sheet of the template: check first_id and family", *least, *most);
+    if (detection.foreign_ids.size() > out.features.size()) out.features.clear();
+  }
+  return out;
+}
+
+void leave_out(SheetPhotograph& photograph, std::string reason) {
+  photograph.features.clear();
+  photograph.reason = std::move(reason);
+}
+
+// The value that most of the photographs have; the smaller of two equally frequent ones.
+template <typename T>
+T most_frequent(const std::map<T, int>& counts) {
+  return std::max_element(counts.begin(), counts.end(),
+                          [](const auto& a, const auto& b) { return a.second < b.second; })
+      ->first;
+}
+
+// A camera is one image size and one zoom setting.
+void leave_out_other_settings(std::vector<SheetPhotograph>& photographs) {
+  std::map<std::pair<int, int>, int> sizes;
+  for (const SheetPhotograph& p : photographs) {
+    if (!p.features.empty()) ++sizes[{p.info.width_px, p.info.height_px}];
+  }
+  if (sizes.empty()) return;
+  const auto size = most_frequent(sizes);
+  std::map<double, int> focals;
+  for (SheetPhotograph& p : photographs) {
+    if (p.features.empty()) continue;
+    if (std::pair(p.info.width_px, p.info.height_px) != size) {
+      leave_out(p,
+                fmt::format("is {} x {} px, the others {} x {} px: resized, cropped or turned by a program",
+                            p.info.width_px, p.info.height_px, size.first, size.second));
+    } else if (p.info.focal_length_mm) {
+      ++focals[*p.info.focal_length_mm];
+    }
+  }
+  if (focals.size() < 2) return;
+  const double focal = most_frequent(focals);
+  for (SheetPhotograph& p : photographs) {
+    if (p.features.empty() || !p.info.focal_length_mm) continue;
+    if (std::abs(*p.info.focal_length_mm - focal) > 0.01 * focal) {
+      leave_out(p, fmt::format("was taken at {:g} mm, the others at {:g} mm: one zoom setting is one camera",
+                               *p.info.focal_length_mm, focal));
+    }
+  }
+}
+
+LensSetting common_setting(const std::vector<SheetPhotograph>& photographs,
+                           const CameraCalibration& calibration) {
+  for (const SheetView& view : calibration.fit.adjustment.state.views) {
+    return lens_setting(photographs[static_cast<std::size_t>(view.photograph)].info);
+  }
+  return {};
+}
+
+}  // namespace
+
+MeasuredCamera measure_camera(const std::vector<fs::path>& paths, const std::vector<Sheet>& sheets,
+                              const CalibrateOptions& options, const std::function<void()>& on_photograph) {
+  MeasuredCamera out;
+  out.photographs.resize(paths.size());
+  Pixels pixels(paths);
+  tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t i) {
+    Photograph photograph;
+    out.photographs[i] = measure(paths[i], sheets, photograph);
+    if (photograph.status == PhotographStatus::ok) pixels.keep(i, std::move(photograph));
+    if (on_photograph) on_photograph();
+  });
+  leave_out_other_settings(out.photographs);
+  out.calibration = rough_calibration(sheets, out.photographs, options);
+  if (out.calibration.status != CalibrationStatus::ok) return out;
+  const CalibrationState& rough = out.calibration.fit.adjustment.state;
+  tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t i) {
+    std::vector<SheetView> views;
+    for (const SheetView& view : rough.views) {
+      if (view.photograph == static_cast<int>(i)) views.push_back(view);
+    }
+    if (!views.empty()) {
+      const Photograph photograph = pixels.get(i);
+      out.photographs[i].features =
+          refine_sheets(photograph.grey, photograph.tone, sheets, rough.shapes, rough.camera, views);
+    }
+    if (on_photograph) on_photograph();
+  });
+  out.calibration = calibrate_camera(sheets, with_features(rough, out.photographs),
+                                     std::max(out.calibration.fit.extra_sigma_px, 0.02), options);
+  out.setting = common_setting(out.photographs, out.calibration);
+  return out;
+}
+
+}  // namespace hexcal
