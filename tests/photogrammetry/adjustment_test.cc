@@ -112,9 +112,10 @@ TEST(Adjustment, NoiseOfOneHundredthPixelStaysWithinTheBudget) {
 TEST(Adjustment, CovariancesAreHonestOverManySeeds) {
   for (const double interior : {0.0, 1.0}) {
     for (const auto mode : {AdjustmentOptions::Interior::refined, AdjustmentOptions::Interior::fixed}) {
+      if (interior == 0 && mode == AdjustmentOptions::Interior::fixed) continue;  // the same thing
       double sum = 0;
       // A fixed interior orientation errs once per seed, not once per pose.
-      const int seeds = interior == 0 ? 4 : mode == AdjustmentOptions::Interior::fixed ? 30 : 8;
+      const int seeds = interior == 0 ? 14 : mode == AdjustmentOptions::Interior::fixed ? 30 : 8;
       for (int seed = 0; seed < seeds; ++seed) {
         ObservationSceneOptions options;
         options.num_epochs = 4;
