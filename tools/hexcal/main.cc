@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
   // In the order of a day's work.
   for (const auto add :
        {hexcal::add_simulate_command, hexcal::add_plan_command, hexcal::add_compensate_command,
-        hexcal::add_evaluate_command, hexcal::add_completion_command}) {
+        hexcal::add_evaluate_command, hexcal::add_report_command, hexcal::add_completion_command}) {
     add(app, action);
   }
   try {
