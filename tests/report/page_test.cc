@@ -20,13 +20,13 @@ HtmlTable sample_table() {
   HtmlTable table;
   table.caption = "Poses";
   table.columns = {{"pose", "", false, ""}, {"x", "mm", true, "position"}, {"status", "", false, ""}};
-  table.rows = {{{"b", {}, Light::good, ""}, number_cell(10, 3), {"ok", {}, Light::good, ""}},
-                {{"a", {}, Light::bad, ""},
+  table.rows = {{{"b", {}, Light::good, "", ""}, number_cell(10, 3), {"ok", {}, Light::good, "", ""}},
+                {{"a", {}, Light::bad, "", ""},
                  number_cell(-9, 3),
-                 {"=1+1 <img src=x onerror=alert(1)>", {}, Light::bad, ""}},
-                {{"c", {}, Light::warning, ""},
+                 {"=1+1 <img src=x onerror=alert(1)>", {}, Light::bad, "", ""}},
+                {{"c", {}, Light::warning, "", ""},
                  number_cell(std::nan(""), 3),
-                 {"too few markers", {}, Light::warning, ""}}};
+                 {"too few markers", {}, Light::warning, "", ""}}};
   return table;
 }
 

@@ -27,6 +27,7 @@ void add_evaluate_command(CLI::App& app, Action& action);
 void add_legs_command(CLI::App& app, Action& action);
 void add_pose_command(CLI::App& app, Action& action);
 void add_workspace_command(CLI::App& app, Action& action);
+void add_report_command(CLI::App& app, Action& action);
 void add_export_command(CLI::App& app, Action& action);
 void add_completion_command(CLI::App& app, Action& action);
 

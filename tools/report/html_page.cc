@@ -64,6 +64,7 @@ Html table_cell(const HtmlCell& cell, bool numeric, bool row_header) {
   Html content;
   if (cell.light != Light::none) content += light_mark(cell.light);
   content += html_text(cell.text);
+  if (!cell.second.empty()) content += html_element("span", html_text(cell.second), {{"class", "unit"}});
   return {fmt::format("<{0}{1}>{2}</{0}>", row_header ? "th" : "td", attributes, content.source)};
 }
 

@@ -34,7 +34,8 @@ struct HtmlCell {
   std::string text;
   std::optional<double> sort_key;  ///< default: the text
   Light light = Light::none;
-  std::string hint;  ///< shown when pointed at
+  std::string hint;    ///< shown when pointed at
+  std::string second;  ///< second line, small: a standard deviation
 };
 /// A cell with a number shown to `decimals` places, sorted by its value; NaN is an empty cell.
 [[nodiscard]] HtmlCell number_cell(double value, int decimals);

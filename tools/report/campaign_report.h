@@ -1,0 +1,88 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "calibration/calibrate.h"
+#include "camera_calib/calibrated_camera.h"
+#include "tools/io/pose_table.h"
+#include "tools/report/html_page.h"
+#include "tools/report/paper_figures.h"
+#include "tools/report/scene.h"
+
+namespace hexcal {
+
+/// The calibration of a campaign with what it was made from.
+struct CompensationPart {
+  PlatformGeometry nominal;
+  ObservationSet observations;
+  CalibrationReport calibration;
+};
+
+/// What a photograph contributed.
+struct PhotographPart {
+  std::string pose_id;
+  std::string name;
+  std::string status;  ///< "ok", or why it was not used
+  int markers = 0;
+  int rejected = 0;
+  double rms_px = 0;
+  std::vector<Arrow> residuals;  ///< at the corners, px; observed minus projected
+  /// The markers' outlines, px, and whether the adjustment used them.
+  std::vector<std::pair<std::array<Eigen::Vector2d, 4>, bool>> outlines;
+  Eigen::Vector2d size_px = Eigen::Vector2d::Zero();
+  std::string thumbnail_jpeg;  ///< bytes of a small JPEG; empty: only the drawing is shown
+};
+
+/// The photogrammetric network.
+struct NetworkPart {
+  double sigma0 = 0;
+  double rms_px = 0;
+  double redundancy = 0;  ///< observations beyond those needed
+  std::vector<PhotographPart> photographs;
+  Scene scene;
+};
+
+struct CameraPart {
+  std::string file;
+  CalibratedCamera camera;
+};
+
+/// Everything that a campaign's report shows; parts that are not there leave their section out, with a
+/// sentence of what would make them.
+struct CampaignReport {
+  std::string name;
+  std::vector<PoseRecord> poses;    ///< results/poses.csv
+  std::vector<PoseRecord> targets;  ///< targets.csv
+  std::optional<CompensationPart> compensation;
+  std::string no_compensation;      ///< why there is none
+  std::vector<LegRecord> commands;  ///< results/actuators.csv
+  std::optional<NetworkPart> network;
+  std::string no_network;
+  std::vector<CameraPart> cameras;
+  /// The poses of a second round or another campaign with the same targets, measured after compensation.
+  std::vector<PoseRecord> second_round;
+  std::string second_round_name;
+  std::vector<std::pair<std::string, std::string>> provenance;  ///< term and value
+};
+
+/// Traffic light of one measured pose, and why in words (empty when good). Judged against the campaign's own
+/// median sigma: one weak pose shows, a campaign of larger markers is not all red.
+struct PoseJudgement {
+  Light light = Light::none;
+  std::string words;
+};
+[[nodiscard]] std::vector<PoseJudgement> judge_poses(const std::vector<PoseRecord>& poses);
+
+/// The paper's data from a campaign: targets against measured poses, cross-validated errors of each method
+/// over the poses that it keeps in the workspace, and the second round's where there is one.
+[[nodiscard]] PaperData paper_data(const CampaignReport& report);
+
+[[nodiscard]] Verdict campaign_verdict(const CampaignReport& report);
+[[nodiscard]] HtmlPage campaign_page(const CampaignReport& report);
+/// Every figure of the page, for a paper.
+[[nodiscard]] std::vector<Chart> campaign_charts(const CampaignReport& report);
+
+}  // namespace hexcal

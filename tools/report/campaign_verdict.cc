@@ -1,0 +1,229 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tools/report/campaign_report.h"
+#include "tools/report/markup.h"
+
+namespace hexcal {
+namespace {
+
+double position_sigma(const PoseRecord& record) { return record.sigma->head<3>().norm(); }
+double orientation_sigma(const PoseRecord& record) { return record.sigma->tail<3>().norm(); }
+
+// A pose that defines a frame has no sigma of its own and says nothing about the others'.
+bool has_sigma(const PoseRecord& record) { return record.sigma && position_sigma(record) > 0; }
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+template <typename Value>
+double median_of(const std::vector<PoseRecord>& poses, Value value) {
+  std::vector<double> values;
+  for (const PoseRecord& record : poses) {
+    if (has_sigma(record)) values.push_back(value(record));
+  }
+  return median(std::move(values));
+}
+
+// "a, b, c and 4 more"
+std::string listed(const std::vector<std::string>& names) {
+  constexpr std::size_t kShown = 6;
+  std::string out;
+  for (std::size_t i = 0; i < std::min(names.size(), kShown); ++i) {
+    if (i > 0) out += i + 1 == names.size() ? " and " : ", ";
+    out += names[i];
+  }
+  if (names.size() > kShown) out += fmt::format(" and {} more", names.size() - kShown);
+  return out;
+}
+
+std::string pose_count(std::size_t count) { return fmt::format("{} pose{}", count, count == 1 ? "" : "s"); }
+
+const CrossValidation* chosen_method(const CampaignReport& report) {
+  if (!report.compensation) return nullptr;
+  for (const CrossValidation& method : report.compensation->calibration.comparison.methods) {
+    if (method.name == report.compensation->calibration.chosen) return &method;
+  }
+  return nullptr;
+}
+
+// What measuring alone says.
+void judge_measurement(const CampaignReport& report, Verdict& verdict) {
+  const std::vector<PoseJudgement> judgements = judge_poses(report.poses);
+  std::vector<std::string> failed, weak;
+  for (std::size_t i = 0; i < judgements.size(); ++i) {
+    if (judgements[i].light == Light::bad) failed.push_back(report.poses[i].id);
+    if (judgements[i].light == Light::warning) weak.push_back(report.poses[i].id);
+  }
+  const std::size_t count = report.poses.size();
+  if (!failed.empty()) {
+    verdict.findings.push_back(fmt::format("{} of {} could not be measured: {}. The table of poses says why.",
+                                           failed.size(), pose_count(count), listed(failed)));
+    verdict.next_steps.push_back(
+        fmt::format("Retake the photographs of {} and run `hexcal measure` again.", listed(failed)));
+  }
+  if (!weak.empty()) {
+    verdict.findings.push_back(
+        fmt::format("{} measured with reservations: {}.", pose_count(weak.size()), listed(weak)));
+  }
+  verdict.light = failed.empty() && weak.empty() ? Light::good : Light::warning;
+  if (2 * failed.size() > count) verdict.light = Light::bad;
+  verdict.headline = fmt::format(
+      "{} of {} measured, typically to {} mm and {} deg (one standard deviation).", count - failed.size(),
+      pose_count(count), significant_text(median_of(report.poses, position_sigma), 2),
+      significant_text(median_of(report.poses, orientation_sigma) * kDegPerRad, 2));
+}
+
+void judge_network(const NetworkPart& network, Verdict& verdict) {
+  if (network.sigma0 > 1.5) {
+    verdict.findings.push_back(fmt::format(
+        "Residuals are {} times what the corners' own standard deviations promise (sigma0): the camera file "
+        "does not fit these photographs, or markers are not flat. The sigmas shown already include this.",
+        significant_text(network.sigma0, 2)));
+    verdict.light = std::max(verdict.light, Light::warning);
+  }
+  std::vector<std::string> unused;
+  for (const PhotographPart& photograph : network.photographs) {
+    if (photograph.status != "ok") unused.push_back(photograph.name);
+  }
+  if (!unused.empty()) {
+    verdict.findings.push_back(fmt::format("{} of {} photographs were not used: {}.", unused.size(),
+                                           network.photographs.size(), listed(unused)));
+  }
+}
+
+void judge_compensation(const CampaignReport& report, const CrossValidation& method, Verdict& verdict) {
+  const CalibrationReport& calibration = report.compensation->calibration;
+  if (calibration.uncompensated) {
+    const ErrorStatistics& before = *calibration.uncompensated;
+    verdict.headline = fmt::format(
+        "Compensation by {} takes the position error from {} to {} mm rms ({} % less) and the orientation "
+        "error from {} "
+        "to {} deg rms ({} % less), judged on poses that the model had not seen.",
+        method.name, significant_text(before.position_rms_mm, 3),
+        significant_text(method.errors.position_rms_mm, 3),
+        significant_text(improvement_percent(before.position_rms_mm, method.errors.position_rms_mm), 3),
+        significant_text(before.orientation_rms_rad * kDegPerRad, 3),
+        significant_text(method.errors.orientation_rms_rad * kDegPerRad, 3),
+        significant_text(improvement_percent(before.orientation_rms_rad, method.errors.orientation_rms_rad),
+                         3));
+    if (method.errors.position_rms_mm >= before.position_rms_mm) {
+      verdict.light = Light::bad;
+      verdict.findings.insert(verdict.findings.begin(),
+                              "No method makes this machine better: do not use the commands.");
+    }
+  }
+  const double noise_mm = median_of(report.poses, position_sigma);
+  if (noise_mm > 0 && method.errors.position_rms_mm < 2 * noise_mm) {
+    verdict.findings.push_back(
+        "What remains is about the noise of the measurement itself: the machine may be better than can be "
+        "seen here.");
+  } else if (noise_mm > 0 && method.errors.position_rms_mm > 10 * noise_mm) {
+    verdict.findings.push_back(
+        fmt::format("What remains is {} times the noise of the measurement: the machine does something that "
+                    "its model lacks "
+                    "(play, bending, temperature), or a pose is wrong.",
+                    significant_text(method.errors.position_rms_mm / noise_mm, 2)));
+  }
+  if (!calibration.outliers.empty()) {
+    verdict.findings.push_back(fmt::format("Left out as near singular: {}.", listed(calibration.outliers)));
+  }
+  if (calibration.identifiability) {
+    for (const LegDiagnosis& leg : calibration.identifiability->legs) {
+      if (leg.wrong) verdict.findings.push_back("Stands out: " + leg.sentence + ".");
+    }
+    if (!calibration.identifiability->advice.empty()) {
+      verdict.next_steps.push_back("To know the machine better: " + calibration.identifiability->advice);
+    }
+  }
+  std::vector<std::string> lost;
+  for (const LegRecord& command : report.commands) {
+    if (command.status != "ok") lost.push_back(command.id);
+  }
+  if (!lost.empty()) {
+    verdict.findings.push_back(
+        fmt::format("{} cannot be reached after compensation: {}.", pose_count(lost.size()), listed(lost)));
+    verdict.light = std::max(verdict.light, Light::warning);
+  }
+}
+
+void judge_second_round(const CampaignReport& report, Verdict& verdict) {
+  const PaperData data = paper_data(report);
+  std::vector<PosePair> before, after;
+  for (std::size_t i = 0; i < data.pose_ids.size(); ++i) {
+    const auto& again = data.methods.back().pairs[i];
+    if (!again || !data.before.pairs[i]) continue;
+    before.push_back(*data.before.pairs[i]);
+    after.push_back(*again);
+  }
+  if (after.empty()) {
+    verdict.findings.push_back(
+        fmt::format("{} shares no measured pose with this campaign.", report.second_round_name));
+    return;
+  }
+  const ErrorStatistics b = error_statistics(before);
+  const ErrorStatistics a = error_statistics(after);
+  verdict.findings.insert(
+      verdict.findings.begin(),
+      fmt::format("Measured again in {} over {}: position {} to {} mm rms, orientation {} to {} deg rms.",
+                  report.second_round_name, pose_count(after.size()), significant_text(b.position_rms_mm, 3),
+                  significant_text(a.position_rms_mm, 3),
+                  significant_text(b.orientation_rms_rad * kDegPerRad, 3),
+                  significant_text(a.orientation_rms_rad * kDegPerRad, 3)));
+}
+
+}  // namespace
+
+std::vector<PoseJudgement> judge_poses(const std::vector<PoseRecord>& poses) {
+  const double typical_mm = median_of(poses, position_sigma);
+  const double typical_rad = median_of(poses, orientation_sigma);
+  std::vector<PoseJudgement> out;
+  for (const PoseRecord& record : poses) {
+    PoseJudgement judgement{Light::good, ""};
+    if (!record.pose) {
+      judgement = {Light::bad, record.status};
+    } else if (record.status != "ok") {
+      judgement = {Light::warning, record.status};
+    } else if (has_sigma(record) &&
+               (position_sigma(record) > 3 * typical_mm || orientation_sigma(record) > 3 * typical_rad)) {
+      judgement = {Light::warning, "sigma more than 3 times the campaign's median"};
+    } else if (record.images && *record.images == 1) {
+      judgement = {Light::warning, "a single photograph: nothing checks it"};
+    }
+    out.push_back(std::move(judgement));
+  }
+  return out;
+}
+
+Verdict campaign_verdict(const CampaignReport& report) {
+  Verdict verdict;
+  if (report.poses.empty()) {
+    verdict.light = Light::bad;
+    verdict.headline = "Nothing has been measured yet.";
+    verdict.next_steps = {
+        "Put the photographs of each pose into a folder of its own and run `hexcal measure`."};
+    return verdict;
+  }
+  judge_measurement(report, verdict);
+  if (report.network) judge_network(*report.network, verdict);
+  if (const CrossValidation* method = chosen_method(report)) judge_compensation(report, *method, verdict);
+  if (!report.compensation && !report.no_compensation.empty())
+    verdict.next_steps.push_back(report.no_compensation);
+  if (!report.second_round.empty()) {
+    judge_second_round(report, verdict);
+  } else if (report.compensation && verdict.light != Light::bad) {
+    verdict.next_steps.push_back(
+        "Send `results/actuators.csv` to the controller, photograph the same poses again and compare the two "
+        "rounds with "
+        "`hexcal report --compare`.");
+  }
+  return verdict;
+}
+
+}  // namespace hexcal
