@@ -4,7 +4,7 @@
 #include <exception>
 
 #include "kinematics/geometry/input_error.h"
-#include "tools/hexcal/command.h"
+#include "tools/hexcal/commands.h"
 #include "tools/hexcal/version.h"
 
 int main(int argc, char** argv) {
