@@ -1,0 +1,96 @@
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "tests/support/run_hexcal.h"
+
+namespace hexcal {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr const char* kHexapod =
+    "base_joints_mm: [[254.3, 54.1, 0], [-80.3, 247.3, 0], [-174, 193.2, 0], [-174, -193.2, 0], [-80.3, "
+    "-247.3, 0], "
+    "[254.3, -54.1, 0]]\n"
+    "platform_joints_mm: [[100.4, 111.5, 0], [46.4, 142.7, 0], [-146.7, 31.2, 0], [-146.7, -31.2, 0], "
+    "[46.4, -142.7, 0], [100.4, -111.5, 0]]\n"
+    "B_from_UG: {xyz_mm: [0, 0, 550], rpy_deg: [0, 0, 0]}\n"
+    "P_from_LG: {xyz_mm: [0, 0, 70], rpy_deg: [0, 0, 0]}\n"
+    "home: {gd_mm: 50}\n"
+    "actuators: {min_mm: 380, max_mm: 580}\n";
+constexpr const char* kHead = "pose,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\n";
+
+class Compensate : public ::testing::Test {
+ protected:
+  std::string write(const std::string& name, const std::string& text) {
+    std::ofstream(folder_.path() / name) << text;
+    return (folder_.path() / name).string();
+  }
+  // Ten targets and what a machine made of them, off by the same motion everywhere.
+  std::string rows(double shift_mm, double turn_deg, double scale_mm = 1) {
+    std::string text;
+    for (int i = 0; i < 10; ++i) {
+      const double t = i;
+      text += fmt::format("p{}", i);
+      for (const double v :
+           {10 * (t - 4) + shift_mm, 5 * (6 - t) + shift_mm, 3 * ((i * 7) % 10 - 4) + shift_mm})
+        text += fmt::format(",{}", v * scale_mm);
+      for (const double v : {(i * 3) % 10 - 4.5, (i * 7) % 10 - 5.5, (i * 9) % 10 - 3.5})
+        text += fmt::format(",{}", v + turn_deg);
+      text += "\n";
+    }
+    return text;
+  }
+  std::string table(double shift_mm, double turn_deg, double scale_mm = 1) {
+    return fmt::format("{}{}", kHead, rows(shift_mm, turn_deg, scale_mm));
+  }
+  CommandResult run(const std::string& poses, const std::string& targets) {
+    return run_hexcal({"compensate", "--hexapod", write("hexapod.yaml", kHexapod), "--targets",
+                       write("targets.csv", targets), "--poses", write("poses.csv", poses), "-o",
+                       (folder_.path() / "out").string()});
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(Compensate, PrintsAllMethodsAndWritesTheFiles) {
+  const CommandResult r = run(table(1.5, 0.3), table(0, 0));
+  EXPECT_LE(r.exit_code, 1) << r.err;
+  EXPECT_THAT(r.out, AllOf(HasSubstr("option1"), HasSubstr("option2"), HasSubstr("option3"),
+                           HasSubstr("kinematic"), HasSubstr("wrote")));
+  for (const char* name : {"model.yaml", "predicted_poses.csv", "actuators.csv"})
+    EXPECT_TRUE(std::filesystem::exists(folder_.path() / "out" / name)) << name;
+  // The same input gives the same bytes.
+  const auto contents = [&] {
+    std::ifstream in(folder_.path() / "out/model.yaml");
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  const std::string first = contents();
+  (void)run(table(1.5, 0.3), table(0, 0));
+  EXPECT_EQ(contents(), first);
+}
+
+TEST_F(Compensate, RefusesInOneClearLine) {
+  const std::string targets = table(0, 0);
+  const std::string good = table(1, 0.2);
+  const auto refused = [&](const std::string& poses, const std::string& wanted_targets, const char* words) {
+    const CommandResult r = run(poses, wanted_targets);
+    EXPECT_EQ(r.exit_code, 2) << words;
+    EXPECT_THAT(r.err, HasSubstr(words));
+    EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+    EXPECT_FALSE(std::filesystem::exists(folder_.path() / "out/model.yaml"));
+  };
+  refused(good.substr(0, good.find("p3")), targets, "3 measured poses");
+  refused(good + "p3,1,2,3,4,5,6\n", targets, "pose 'p3' stands twice");
+  refused(table(1, 0.2, 0.001), targets, "metres?");
+  refused(good + "q,nan,2,3,4,5,6\n", targets, "x_mm");
+  refused(good, fmt::format("{}z,0,0,0,0,0,0\n", kHead), "no pose has a target");
+  refused(good + "far,0,0,300,0,0,0\n", targets + "far,0,0,300,0,0,0\n", "wanted 380 to 580 mm");
+}
+
+}  // namespace
+}  // namespace hexcal
