@@ -51,9 +51,11 @@ std::optional<LegVector> readings_for_pose(const CalibrationModel& model, const 
 std::optional<Pose> pose_for_readings(const CalibrationModel& model, const LegVector& readings) {
   const bool kinematic = model.method == CompensationMethod::kinematic;
   const MachineModel machine = kinematic ? model.machine : MachineModel{.geometry = model.nominal};
-  // The feasible pose of the bare geometry is the start of the one with all terms.
-  const ForwardResult feasible =
-      forward_kinematics(machine.geometry, lengths_from_readings(machine.geometry, readings));
+  // The feasible pose of the bare geometry is the start of the one with all terms. It is searched from home,
+  // which only the hexapod's own frames know: in unknown frames of a measurement the zero pose may be
+  // anywhere.
+  const PlatformGeometry own = kinematic ? machine_in_hexapod_frames(model).geometry : model.nominal;
+  const ForwardResult feasible = forward_kinematics(own, lengths_from_readings(own, readings));
   if (feasible.status != ForwardStatus::converged) return std::nullopt;
   const auto pose = machine_pose(machine, readings, machine.geometry.pose_from_B_from_P(*feasible.B_from_P));
   if (!pose || kinematic || model.method == CompensationMethod::nominal) return pose;
