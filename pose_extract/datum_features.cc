@@ -1,0 +1,247 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "kinematics/geometry/covariance.h"
+#include "pose_extract/datum_frame.h"
+#include "pose_extract/feature_fit.h"
+
+namespace hexcal {
+namespace {
+
+constexpr double kFewestToleranceMm = 0.02;  // of a point from its feature; printed stickers are no flatter
+constexpr double kToleranceSigmas = 6;
+constexpr double kDifferenceMm = 1e-4;  // step of the derivatives
+constexpr double kSteepestDeg = 10;     // least angle between z and x
+
+// The measured points of one feature.
+struct FeaturePoints {
+  Feature::Kind kind;
+  std::vector<MarkerPoint> names;
+  Eigen::Matrix3Xd points, normals;
+  Eigen::VectorXd sigma_mm;
+  std::vector<Eigen::Matrix3Xd> by_common;
+  std::vector<char> used;
+  std::optional<Eigen::Vector3d> towards;
+};
+
+FeaturePoints gather(const Network& network, const AdjustmentResult& adjusted, Body body,
+                     const Feature& feature) {
+  FeaturePoints out;
+  out.kind = feature.kind;
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Vector3d> normals;
+  std::vector<double> sigmas;
+  const auto add = [&](int marker, const MarkerPoint& name) {
+    Eigen::Matrix3Xd by_common;
+    points.push_back(
+        marker_point(network, adjusted.geometry, adjusted.layout, marker, name.corner, &by_common));
+    const Eigen::Matrix3d covariance = by_common * adjusted.common_covariance * by_common.transpose();
+    sigmas.push_back(std::sqrt(std::max(1e-10, covariance.trace() / 3)));
+    normals.emplace_back(
+        adjusted.geometry.body_from_marker[static_cast<std::size_t>(marker)].rotation_matrix().col(2));
+    out.names.push_back(name);
+    out.by_common.push_back(std::move(by_common));
+  };
+  for (const MarkerPoint& name : feature.points) {
+    const int marker = measured_marker(network, adjusted, body, name.id);
+    if (marker < 0) continue;
+    // A marker stands for its corners, except where single points are meant.
+    const bool single =
+        name.corner >= 0 || feature.kind == Feature::Kind::point || feature.kind == Feature::Kind::line;
+    if (single) {
+      add(marker, name);
+    } else {
+      for (int c = 0; c < 4; ++c) add(marker, {name.id, c});
+    }
+  }
+  out.points.resize(3, static_cast<Eigen::Index>(points.size()));
+  out.normals.resize(3, static_cast<Eigen::Index>(points.size()));
+  out.sigma_mm.resize(static_cast<Eigen::Index>(points.size()));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    out.points.col(static_cast<Eigen::Index>(i)) = points[i];
+    out.normals.col(static_cast<Eigen::Index>(i)) = normals[i];
+    out.sigma_mm[static_cast<Eigen::Index>(i)] = sigmas[i];
+  }
+  // Weights inside one feature follow the stickers, not the noise: the gauge's marker would otherwise count
+  // for all.
+  if (out.sigma_mm.size() > 0) out.sigma_mm.array() = std::max(1e-4, out.sigma_mm.mean());
+  if (feature.towards) {
+    const int marker = measured_marker(network, adjusted, body, feature.towards->id);
+    if (marker >= 0) {
+      out.towards =
+          marker_point(network, adjusted.geometry, adjusted.layout, marker, feature.towards->corner, nullptr);
+    }
+  }
+  return out;
+}
+
+FittedFeature fit(const FeaturePoints& points) {
+  FittedFeature fitted =
+      fit_feature(points.kind, points.points, points.sigma_mm, points.normals, points.used);
+  if (!fitted.ok) return fitted;
+  Eigen::Vector3d side = Eigen::Vector3d::Zero();
+  if (points.towards) {
+    side = *points.towards - fitted.place;
+  } else if (points.kind == Feature::Kind::plane || points.kind == Feature::Kind::circle) {
+    side = points.normals.rowwise().sum();
+  }
+  if (side.dot(fitted.direction) < 0) fitted.direction = -fitted.direction;
+  return fitted;
+}
+
+// Whole markers that do not lie on the feature: first the consensus, then the residuals of the fit.
+void choose_points(FeaturePoints& points) {
+  const double tolerance = std::max(kFewestToleranceMm, kToleranceSigmas * points.sigma_mm.mean());
+  points.used = consensus_points(points.kind, points.points, tolerance);
+  // A sticker lifts as a whole: a marker most of whose corners are out is out.
+  std::map<int, std::pair<int, int>> per_marker;
+  for (std::size_t i = 0; i < points.names.size(); ++i) {
+    auto& [in, out] = per_marker[points.names[i].id];
+    (points.used[i] ? in : out) += 1;
+  }
+  for (std::size_t i = 0; i < points.names.size(); ++i) {
+    const auto& [in, out] = per_marker[points.names[i].id];
+    points.used[i] = in > out;
+  }
+  if (points.kind != Feature::Kind::cylinder) return;
+  // Leave out the worst marker as long as the fit says so.
+  for (std::size_t round = 0; round + 3 < per_marker.size(); ++round) {
+    const FittedFeature fitted = fit(points);
+    if (!fitted.ok) return;
+    double worst = tolerance;
+    int id = -1;
+    for (std::size_t i = 0; i < points.names.size(); ++i) {
+      if (!points.used[i] || std::abs(fitted.distance_mm[i]) <= worst) continue;
+      worst = std::abs(fitted.distance_mm[i]);
+      id = points.names[i].id;
+    }
+    if (id < 0) return;
+    for (std::size_t i = 0; i < points.names.size(); ++i) points.used[i] &= points.names[i].id != id;
+  }
+}
+
+struct FeatureSet {
+  FeaturePoints z, x, origin;
+};
+
+std::optional<Rigid3> construct(const FeatureSet& set, const Eigen::Vector3d& offset_mm,
+                                std::string& reason) {
+  const FittedFeature z = fit(set.z);
+  const FittedFeature x = fit(set.x);
+  const FittedFeature origin = fit(set.origin);
+  for (const auto& [name, feature] : {std::pair{"z", &z}, std::pair{"x", &x}, std::pair{"origin", &origin}}) {
+    if (feature->ok) continue;
+    reason = fmt::format("its {} feature: {}", name, feature->reason);
+    return std::nullopt;
+  }
+  if (z.direction.isZero() || x.direction.isZero()) {
+    reason = "z and x must be a plane, line, circle or cylinder: a point or sphere has no direction";
+    return std::nullopt;
+  }
+  const Eigen::Vector3d across = x.direction - x.direction.dot(z.direction) * z.direction;
+  if (across.norm() < std::sin(kSteepestDeg * kRadPerDeg)) {
+    reason = "its z and x directions are nearly parallel";
+    return std::nullopt;
+  }
+  Eigen::Matrix3d body_frame;
+  body_frame.col(2) = z.direction;
+  body_frame.col(0) = across.normalized();
+  body_frame.col(1) = body_frame.col(2).cross(body_frame.col(0));
+  // The origin lies on the z feature when that is an axis and the origin's feature is a plane: where they
+  // meet.
+  Eigen::Vector3d place = origin.place;
+  if (set.origin.kind == Feature::Kind::plane && set.z.kind == Feature::Kind::cylinder) {
+    place = z.place +
+            (origin.place - z.place).dot(origin.direction) / z.direction.dot(origin.direction) * z.direction;
+  }
+  return inverse(Rigid3(body_frame, place + body_frame * offset_mm));
+}
+
+const char* form_name(Feature::Kind kind) {
+  switch (kind) {
+    case Feature::Kind::plane:
+      return "flatness";
+    case Feature::Kind::line:
+      return "straightness";
+    case Feature::Kind::circle:
+    case Feature::Kind::sphere:
+      return "roundness";
+    case Feature::Kind::cylinder:
+      return "cylindricity";
+    case Feature::Kind::point:
+      break;
+  }
+  return "form";
+}
+
+void report(const FeaturePoints& points, const char* name, DatumFrame& frame) {
+  const FittedFeature fitted = fit(points);
+  if (!fitted.ok || points.kind == Feature::Kind::point) return;
+  frame.notes.push_back(fmt::format("{}: {} {:.4f} mm", name, form_name(points.kind), fitted.form_error_mm));
+  std::map<int, double> lifted;
+  for (std::size_t i = 0; i < points.names.size(); ++i) {
+    const double distance = fitted.distance_mm[i];
+    frame.residuals.push_back({points.names[i], distance * fitted.direction,
+                               points.sigma_mm[static_cast<Eigen::Index>(i)], points.used[i] != 0});
+    if (!points.used[i] && std::abs(distance) > std::abs(lifted[points.names[i].id])) {
+      lifted[points.names[i].id] = distance;
+    }
+  }
+  for (const auto& [id, distance] : lifted) {
+    frame.notes.push_back(fmt::format("{}: marker {} lies {:.3f} mm off and was left out (a lifted sticker?)",
+                                      name, id, distance));
+  }
+}
+
+}  // namespace
+
+DatumFrame frame_from_features(const Network& network, const AdjustmentResult& adjusted, Body body,
+                               const FeatureFrame& features) {
+  DatumFrame frame;
+  FeatureSet set{gather(network, adjusted, body, features.z), gather(network, adjusted, body, features.x),
+                 gather(network, adjusted, body, features.origin)};
+  for (FeaturePoints* points : {&set.z, &set.x, &set.origin}) {
+    if (points->points.cols() == 0) {
+      frame.reason = "none of a feature's markers was measured";
+      return frame;
+    }
+    choose_points(*points);
+  }
+  const auto found = construct(set, features.offset_mm, frame.reason);
+  if (!found) return frame;
+  frame.frame_from_body = *found;
+  frame.by_common = Eigen::Matrix<double, 7, Eigen::Dynamic>::Zero(7, adjusted.layout.size);
+  // Derivatives of the frame by each point, through the fits, then by the common parameters.
+  for (FeaturePoints* points : {&set.z, &set.x, &set.origin}) {
+    for (Eigen::Index i = 0; i < points->points.cols(); ++i) {
+      if (!points->used[static_cast<std::size_t>(i)]) continue;
+      Eigen::Matrix<double, 6, 3> by_point;
+      for (int c = 0; c < 3; ++c) {
+        const double kept = points->points(c, i);
+        std::string ignored;
+        points->points(c, i) = kept + kDifferenceMm;
+        const auto plus = construct(set, features.offset_mm, ignored);
+        points->points(c, i) = kept - kDifferenceMm;
+        const auto minus = construct(set, features.offset_mm, ignored);
+        points->points(c, i) = kept;
+        if (!plus || !minus) {
+          frame.reason = "its features are too weak to construct it";
+          return frame;
+        }
+        by_point.col(c) = perturbation_between(*minus, *plus) / (2 * kDifferenceMm);
+      }
+      frame.by_common.topRows<6>() += by_point * points->by_common[static_cast<std::size_t>(i)];
+    }
+  }
+  report(set.z, "z", frame);
+  report(set.x, "x", frame);
+  report(set.origin, "origin", frame);
+  frame.ok = true;
+  frame.reason.clear();
+  return frame;
+}
+
+}  // namespace hexcal

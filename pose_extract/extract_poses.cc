@@ -1,0 +1,374 @@
+#include "pose_extract/extract_poses.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "kinematics/geometry/covariance.h"
+#include "kinematics/geometry/input_error.h"
+#include "pose_extract/photograph_screening.h"
+#include "pose_extract/pose_verdict.h"
+
+namespace hexcal {
+namespace {
+
+constexpr double kScaleDisagreementSigmas = 3.0;
+
+int marker_index(const Network& network, int id) {
+  for (std::size_t m = 0; m < network.markers.size(); ++m) {
+    if (network.markers[m].id == id) return static_cast<int>(m);
+  }
+  return -1;
+}
+
+Network make_network(const Campaign& campaign, const CampaignObservations& observations,
+                     const std::vector<MeasuredPhotograph>& photographs) {
+  Network network;
+  for (const CalibratedCamera& camera : observations.cameras) {
+    network.cameras.push_back({camera.model, camera.covariance});
+  }
+  for (const auto& [id, size] : campaign.fixed) network.markers.push_back({id, Body::fixed, size});
+  for (const auto& [id, size] : campaign.moving) network.markers.push_back({id, Body::moving, size});
+  std::map<std::string, int> epoch_of;
+  for (const std::string& pose : observations.poses) {
+    const int next = static_cast<int>(epoch_of.size());
+    epoch_of.emplace(pose, next);
+  }
+  network.num_epochs = static_cast<int>(epoch_of.size());
+  for (std::size_t p = 0; p < photographs.size(); ++p) {
+    const CampaignPhotograph& photograph = observations.photographs[p];
+    NetworkPhoto photo;
+    photo.camera = std::max(0, photograph.camera);
+    photo.epoch = epoch_of.at(photograph.pose);
+    if (photographs[p].status == PhotoStatus::ok) photo.markers = photograph.seen.markers;
+    network.photos.push_back(std::move(photo));
+  }
+  for (const KnownLength& bar : campaign.bars) {
+    network.lengths.push_back({marker_index(network, bar.a.id), bar.a.corner, marker_index(network, bar.b.id),
+                               bar.b.corner, bar.length_mm, bar.sigma_mm});
+  }
+  return network;
+}
+
+bool seen_twice(const Network& network, int marker) {
+  int times = 0;
+  for (const NetworkPhoto& photo : network.photos) {
+    times +=
+        static_cast<int>(std::count_if(photo.markers.begin(), photo.markers.end(), [&](const auto& seen) {
+          return seen.id == network.markers[static_cast<std::size_t>(marker)].id &&
+                 seen.status == MarkerStatus::ok;
+        }));
+  }
+  return times >= 2;
+}
+
+// Without a single measured bar the scale would be open: the markers' sizes have to do, said aloud.
+void choose_scale(const Campaign& campaign, CampaignResult& result, AdjustmentOptions& options) {
+  std::erase_if(result.network.lengths, [&](const NetworkLength& length) {
+    return !seen_twice(result.network, length.marker_a) || !seen_twice(result.network, length.marker_b);
+  });
+  options.print_scale_free = campaign.scale == ScaleFrom::bars;
+  options.print_scale_sigma = campaign.print_scale_sigma;
+  if (options.print_scale_free && result.network.lengths.empty()) {
+    options.print_scale_free = false;
+    result.warnings.emplace_back("no scale bar was measured: the scale is that of the markers' sizes");
+  }
+}
+
+DatumFrame body_frame(const CampaignResult& result, const std::optional<FrameRule>& rule, Body body,
+                      bool with_scale) {
+  if (!rule) return frame_from_first_marker(result.network, result.adjusted, body);
+  if (rule->from == FrameRule::From::features) {
+    return frame_from_features(result.network, result.adjusted, body, *rule->features);
+  }
+  return frame_from_nominal(result.network, result.adjusted, body, rule->nominal, with_scale);
+}
+
+// Nominal coordinates beside another source of scale: do they agree?
+void compare_nominal_scale(const CampaignResult& base, const std::optional<FrameRule>& rule, Body body,
+                           const char* name, std::vector<std::string>& warnings) {
+  if (!rule || rule->from != FrameRule::From::nominal) return;
+  const DatumFrame scaled = frame_from_nominal(base.network, base.adjusted, body, rule->nominal, true);
+  if (!scaled.ok) return;
+  const Eigen::RowVectorXd row = scaled.by_common.row(6);
+  const double sigma =
+      std::sqrt((row * base.adjusted.common_covariance * row.transpose())(0) + scaled.own(6, 6));
+  if (std::abs(scaled.scale - 1) <= kScaleDisagreementSigmas * sigma) return;
+  warnings.push_back(
+      fmt::format("{}'s nominal coordinates are {:.4f} % larger than measured (sigma {:.4f} %): they "
+                  "disagree with the scale used",
+                  name, (scaled.scale - 1) * 100, sigma * 100));
+}
+
+Rigid3 scaled_motion(const Rigid3& motion, double scale) {
+  return {motion.rotation, scale * motion.translation};
+}
+
+// Error of a motion as multiples of the errors it depends on.
+struct MotionInfluence {
+  Matrix6Xd by_common;
+  Vector6d by_scale = Vector6d::Zero();
+  Matrix6d by_epoch = Matrix6d::Zero();  // of the epoch's own noise
+};
+
+MotionInfluence epoch_influence(const AdjustmentResult& adjusted, std::size_t epoch, double scale) {
+  MotionInfluence influence;
+  Vector6d lengths = Vector6d::Ones();
+  lengths.head<3>() *= scale;
+  influence.by_common = -(lengths.asDiagonal() * adjusted.epochs[epoch].by_common);
+  influence.by_epoch = lengths.asDiagonal();
+  influence.by_scale.head<3>() = scale * adjusted.geometry.fixed_from_moving[epoch].translation;
+  return influence;
+}
+
+// Pose of one epoch and how errors act on it.
+struct EpochPose {
+  Pose pose;
+  CampaignResult::PoseInfluence influence;
+};
+
+class PoseChain {
+ public:
+  PoseChain(const CampaignResult& result, double gd_mm) : result_(result), gd_mm_(gd_mm) {}
+
+  [[nodiscard]] EpochPose at(std::size_t epoch) const {
+    const AdjustmentResult& adjusted = result_.adjusted;
+    const double scale = result_.UG.scale;
+    const Rigid3& u = result_.UG.frame_from_body;
+    const Rigid3 t = scaled_motion(adjusted.geometry.fixed_from_moving[epoch], scale);
+    const MotionInfluence ti = epoch_influence(adjusted, epoch, scale);
+    const Rigid3 x = u * t;
+    const Matrix6d xu = product_jacobian_left(u, t);
+    const Matrix6d xt = product_jacobian_right(u, t);
+
+    EpochPose out;
+    CampaignResult::PoseInfluence& influence = out.influence;
+    // UG_from_moving: by the datum (with its scale), the epoch's own noise and the common parameters.
+    influence.by_ug << xu, xt * ti.by_scale;
+    influence.by_own = xt * ti.by_epoch;
+    influence.by_common = xt * ti.by_common;
+    Rigid3 moving_from_LG;
+    Matrix6d zl;
+    if (result_.home_epoch >= 0) {
+      const auto home = static_cast<std::size_t>(result_.home_epoch);
+      const Rigid3 th = scaled_motion(adjusted.geometry.fixed_from_moving[home], scale);
+      const MotionInfluence hi = epoch_influence(adjusted, home, scale);
+      const Rigid3 y = u * th;
+      const Rigid3 down = Rigid3::from_translation({0, 0, -gd_mm_});
+      moving_from_LG = inverse(y) * down;
+      zl = product_jacobian_right(x, moving_from_LG) * product_jacobian_left(inverse(y), down) *
+           inverse_jacobian(y);
+      const Matrix6d yt = product_jacobian_right(u, th);
+      const Matrix6d zx = product_jacobian_left(x, moving_from_LG);
+      Eigen::Matrix<double, 6, 7> y_by_ug;
+      y_by_ug << product_jacobian_left(u, th), yt * hi.by_scale;
+      influence.by_ug = zx * influence.by_ug + zl * y_by_ug;
+      influence.by_own = zx * influence.by_own;
+      influence.by_home = zl * yt * hi.by_epoch;
+      influence.by_common = zx * influence.by_common + zl * (yt * hi.by_common);
+    } else {
+      const Rigid3& m = result_.LG.frame_from_body;
+      moving_from_LG = inverse(m);
+      zl = product_jacobian_right(x, moving_from_LG) * inverse_jacobian(m);
+      const Matrix6d zx = product_jacobian_left(x, moving_from_LG);
+      influence.by_ug = zx * influence.by_ug;
+      influence.by_own = zx * influence.by_own;
+      influence.by_common = zx * influence.by_common + zl * result_.LG.by_common.topRows<6>();
+      influence.by_lg.leftCols<6>() = zl;
+    }
+    out.pose = pose_from_ug_from_lg(x * moving_from_LG, gd_mm_);
+    const Matrix6d parameters = pose_parameters_jacobian(out.pose);
+    influence.by_ug = parameters * influence.by_ug;
+    influence.by_lg = parameters * influence.by_lg;
+    influence.by_own = parameters * influence.by_own;
+    influence.by_home = parameters * influence.by_home;
+    // The datum's own error also follows the common parameters.
+    influence.by_common = parameters * influence.by_common + influence.by_ug * result_.UG.by_common;
+    return out;
+  }
+
+ private:
+  const CampaignResult& result_;
+  double gd_mm_;
+};
+
+MeasuredLength measure_length(const CampaignResult& result, const KnownLength& known) {
+  MeasuredLength length{known, false, 0, 0};
+  const int a = marker_index(result.network, known.a.id);
+  const int b = marker_index(result.network, known.b.id);
+  const auto& has = result.adjusted.geometry.has_marker;
+  if (a < 0 || b < 0 || !has[static_cast<std::size_t>(a)] || !has[static_cast<std::size_t>(b)]) return length;
+  Eigen::Matrix3Xd ja;
+  Eigen::Matrix3Xd jb;
+  const AdjustmentResult& adjusted = result.adjusted;
+  const Eigen::Vector3d d =
+      marker_point(result.network, adjusted.geometry, adjusted.layout, b, known.b.corner, &jb) -
+      marker_point(result.network, adjusted.geometry, adjusted.layout, a, known.a.corner, &ja);
+  const Eigen::RowVectorXd row = d.normalized().transpose() * (jb - ja);
+  length.measured = true;
+  length.length_mm = result.UG.scale * d.norm();
+  length.sigma_mm = result.UG.scale * std::sqrt((row * adjusted.common_covariance * row.transpose())(0));
+  return length;
+}
+
+void measure_points(CampaignResult& result) {
+  const AdjustmentResult& adjusted = result.adjusted;
+  for (std::size_t m = 0; m < result.network.markers.size(); ++m) {
+    const NetworkMarker& marker = result.network.markers[m];
+    const DatumFrame& datum = marker.body == Body::fixed ? result.UG : result.LG;
+    if (!adjusted.geometry.has_marker[m] || !datum.ok) continue;
+    const Eigen::Matrix3d rotation = datum.frame_from_body.rotation_matrix();
+    for (int c = 0; c < 4; ++c) {
+      Eigen::Matrix3Xd by_common;
+      const Eigen::Vector3d in_body =
+          result.UG.scale * marker_point(result.network, adjusted.geometry, adjusted.layout,
+                                         static_cast<int>(m), c, &by_common);
+      const Eigen::Vector3d turned = rotation * in_body;
+      Eigen::Matrix<double, 3, 7> by_datum;
+      by_datum << Eigen::Matrix3d::Identity(), -skew(turned), turned;
+      const Eigen::Matrix3Xd total = result.UG.scale * rotation * by_common + by_datum * datum.by_common;
+      result.points.push_back({{marker.id, c},
+                               marker.body,
+                               turned + datum.frame_from_body.translation,
+                               total * adjusted.common_covariance * total.transpose() +
+                                   by_datum * datum.own * by_datum.transpose()});
+    }
+  }
+}
+
+// Camera stations in UG with their covariance.
+void measure_stations(CampaignResult& result) {
+  const AdjustmentResult& adjusted = result.adjusted;
+  const DatumFrame& ug = result.UG;
+  for (std::size_t p = 0; p < result.photographs.size(); ++p) {
+    MeasuredPhotograph& photograph = result.photographs[p];
+    if (!adjusted.geometry.has_photo[p] || !ug.ok) continue;
+    const Rigid3 fixed_from_camera = inverse(scaled_motion(adjusted.geometry.camera_from_fixed[p], ug.scale));
+    photograph.UG_from_camera = ug.frame_from_body * fixed_from_camera;
+    const Matrix6d camera = photo_covariance(adjusted, static_cast<int>(p), result.network.photos[p].epoch);
+    const Matrix6d j = product_jacobian_right(ug.frame_from_body, fixed_from_camera) *
+                       inverse_jacobian(scaled_motion(adjusted.geometry.camera_from_fixed[p], ug.scale));
+    const Matrix6d left = product_jacobian_left(ug.frame_from_body, fixed_from_camera);
+    photograph.covariance =
+        j * camera * j.transpose() + left * ug.own.topLeftCorner<6, 6>() * left.transpose();
+  }
+}
+
+}  // namespace
+
+void ExtractOptions::validate() const {
+  adjustment.validate();
+  if (!(max_sigma_mm > 0)) {
+    throw InputError(fmt::format("option max_sigma_mm: found {}, wanted more than 0", max_sigma_mm));
+  }
+  if (min_intersection_deg < 0) {
+    throw InputError(
+        fmt::format("option min_intersection_deg: found {}, wanted 0 or more", min_intersection_deg));
+  }
+}
+
+Matrix6d CampaignResult::pose_covariance(std::size_t a, std::size_t b) const {
+  if (!poses[a].pose || !poses[b].pose) return Matrix6d::Zero();
+  const PoseInfluence& ia = influences[a];
+  const PoseInfluence& ib = influences[b];
+  Matrix6d covariance = ia.by_common * adjusted.common_covariance * ib.by_common.transpose() +
+                        ia.by_ug * UG.own * ib.by_ug.transpose() + ia.by_lg * LG.own * ib.by_lg.transpose();
+  if (home_epoch >= 0) {
+    covariance +=
+        ia.by_home * adjusted.epochs[static_cast<std::size_t>(home_epoch)].own * ib.by_home.transpose();
+  }
+  if (a == b) covariance += ia.by_own * adjusted.epochs[a].own * ib.by_own.transpose();
+  return covariance;
+}
+
+CampaignResult extract_poses(const Campaign& campaign, const CampaignObservations& observations,
+                             const ExtractOptions& options) {
+  options.validate();
+  CampaignResult result;
+  const bool from_home = campaign.lg && campaign.lg->from == FrameRule::From::home;
+  if (from_home) {
+    const auto found =
+        std::find(observations.poses.begin(), observations.poses.end(), campaign.lg->home_pose);
+    if (found == observations.poses.end()) {
+      throw InputError(fmt::format("{}: frames.LG.pose: found '{}', which is none of the poses: {}",
+                                   campaign.file.string(), campaign.lg->home_pose,
+                                   fmt::join(observations.poses, ", ")));
+    }
+    result.home_epoch = static_cast<int>(found - observations.poses.begin());
+  }
+  result.has_moving = !campaign.moving.empty();
+  if (campaign.lg) result.gd_mm = campaign.lg->gd_mm;
+  result.photographs = screen_photographs(campaign, observations);
+  result.network = make_network(campaign, observations, result.photographs);
+  ExtractOptions chosen = options;
+  choose_scale(campaign, result, chosen.adjustment);
+  result.adjusted = adjust_network(result.network, chosen.adjustment);
+  result.poses.resize(observations.poses.size());
+  result.influences.resize(observations.poses.size());
+  for (std::size_t e = 0; e < result.poses.size(); ++e) result.poses[e].id = observations.poses[e];
+  judge_photographs(observations, result);
+  if (result.adjusted.status == AdjustmentStatus::nothing_connected) {
+    result.warnings.push_back(result.adjusted.reason);
+    judge_poses(campaign, observations, options, result);
+    return result;
+  }
+  if (result.adjusted.status != AdjustmentStatus::ok) result.warnings.push_back(result.adjusted.reason);
+
+  const bool nominal_scale = campaign.scale == ScaleFrom::nominal;
+  const bool by_ug = nominal_scale && campaign.ug && campaign.ug->from == FrameRule::From::nominal;
+  result.UG = body_frame(result, campaign.ug, Body::fixed, by_ug);
+  if (!campaign.moving.empty() && !from_home) {
+    result.LG = body_frame(result, campaign.lg, Body::moving, nominal_scale && !by_ug);
+    if (nominal_scale && !by_ug) {
+      // The moving body's scale holds for both; its noise is small beside the datum's and stays with LG.
+      result.UG.scale = result.LG.scale;
+    }
+  }
+  if (!nominal_scale) {
+    compare_nominal_scale(result, campaign.ug, Body::fixed, "UG", result.warnings);
+    compare_nominal_scale(result, campaign.lg, Body::moving, "LG", result.warnings);
+  }
+  if (from_home && result.UG.ok) {
+    const auto home = static_cast<std::size_t>(result.home_epoch);
+    if (result.adjusted.geometry.has_epoch[home]) {
+      const Rigid3 y = result.UG.frame_from_body *
+                       scaled_motion(result.adjusted.geometry.fixed_from_moving[home], result.UG.scale);
+      result.LG.ok = true;
+      result.LG.reason.clear();
+      result.LG.frame_from_body = Rigid3::from_translation({0, 0, campaign.lg->gd_mm}) * y;
+      result.LG.by_common = Eigen::Matrix<double, 7, Eigen::Dynamic>::Zero(7, result.adjusted.layout.size);
+    } else {
+      result.LG.reason = fmt::format("the home pose '{}' was not measured", campaign.lg->home_pose);
+    }
+  }
+  if (result.UG.ok && result.LG.ok) {
+    const PoseChain chain(result, campaign.lg->gd_mm);
+    for (std::size_t e = 0; e < result.poses.size(); ++e) {
+      if (!result.adjusted.geometry.has_epoch[e]) continue;
+      EpochPose found = chain.at(e);
+      if (static_cast<int>(e) == result.home_epoch) {
+        // Zero by definition and depends on nothing; what is left is rounding.
+        found.pose = Pose();
+        found.influence = {};
+        found.influence.by_common = Matrix6Xd::Zero(6, result.adjusted.layout.size);
+      }
+      result.poses[e].pose = found.pose;
+      result.influences[e] = std::move(found.influence);
+    }
+    for (std::size_t e = 0; e < result.poses.size(); ++e)
+      result.poses[e].covariance = result.pose_covariance(e, e);
+  }
+  for (const KnownLength& bar : campaign.bars) result.bars.push_back(measure_length(result, bar));
+  for (const KnownLength& check : campaign.checks) result.checks.push_back(measure_length(result, check));
+  measure_points(result);
+  measure_stations(result);
+  judge_poses(campaign, observations, options, result);
+  judge_campaign(campaign, result);
+  return result;
+}
+
+}  // namespace hexcal

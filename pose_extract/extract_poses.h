@@ -1,0 +1,139 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "camera_calib/calibrated_camera.h"
+#include "photogrammetry/adjustment/adjustment.h"
+#include "photogrammetry/markers/detect.h"
+#include "pose_extract/campaign.h"
+#include "pose_extract/datum_frame.h"
+
+// From marker observations to the poses of the lower grip: the whole measurement of a campaign, without
+// pixels, files or printing. The stages, in order:
+//   1. photographs that cannot count are set aside with words (unreadable, wrong camera setting, seen twice);
+//   2. one bundle adjustment over the campaign (photogrammetry/adjustment/adjustment.h);
+//   3. datum frames UG and LG on the two bodies (datum_frame.h);
+//   4. each epoch's pose and covariance in home axes, and words for each pose that is not good.
+
+namespace hexcal {
+
+/// A photograph of the campaign after detection.
+struct CampaignPhotograph {
+  std::string pose;
+  int camera = 0;  ///< index into CampaignObservations::cameras; -1: no camera file is for it
+  PhotographObservations seen;
+};
+
+struct CampaignObservations {
+  std::vector<CalibratedCamera> cameras;
+  std::vector<std::string> poses;  ///< all ids in the order of the output
+  std::vector<CampaignPhotograph> photographs;
+};
+
+struct ExtractOptions {
+  AdjustmentOptions adjustment;
+  /// A pose whose largest position sigma exceeds this is refused as weak.
+  double max_sigma_mm = 1.0;
+  /// Below this angle between the lines of sight a pose counts as seen from nearly one direction.
+  double min_intersection_deg = 5.0;
+
+  void validate() const;
+};
+
+enum class PhotoStatus {
+  ok,
+  unreadable,    ///< the file
+  wrong_camera,  ///< another image size, body, lens or focal length than the camera file's
+  duplicate,     ///< the same photograph twice
+  no_markers,    ///< none of the campaign's
+  disconnected,  ///< not connected with the others by fixed markers
+  disagrees,     ///< most of its markers contradict the others
+};
+
+enum class PoseStatus {
+  ok,
+  no_photographs,
+  no_usable_photographs,
+  same_photographs,  ///< as another pose
+  no_moving_markers,
+  disconnected,
+  ambiguous,      ///< a planar two-fold solution is open
+  weak_geometry,  ///< sigma beyond max_sigma_mm
+  contradictory,  ///< most markers rejected
+  no_datum,       ///< UG or LG could not be found
+};
+
+[[nodiscard]] const char* photo_status_name(PhotoStatus status);
+[[nodiscard]] const char* pose_status_name(PoseStatus status);
+
+struct MeasuredPhotograph {
+  PhotoStatus status = PhotoStatus::ok;
+  std::string words;  ///< why not ok, or a warning
+  std::optional<Rigid3> UG_from_camera;
+  Matrix6d covariance = Matrix6d::Zero();  ///< perturbation of UG_from_camera (covariance.h)
+  ResidualSummary residuals;
+};
+
+/// Pose of LG relative to its home.
+struct MeasuredPose {
+  std::string id;
+  PoseStatus status = PoseStatus::no_photographs;
+  std::string words;  ///< why not ok, or warnings
+  std::optional<Pose> pose;
+  Matrix6d covariance = Matrix6d::Zero();  ///< of (x, y, z, roll, pitch, yaw), mm and rad
+  int images = 0;                          ///< photographs used
+  int markers = 0;                         ///< different markers of the moving body used
+  double rms_px = 0;
+  double intersection_deg =
+      0;  ///< median over its moving markers of the largest angle between lines of sight
+};
+
+struct MeasuredLength {
+  KnownLength known;
+  bool measured = false;
+  double length_mm = 0;
+  double sigma_mm = 0;  ///< of the measured length
+};
+
+struct MeasuredPoint {
+  MarkerPoint point;
+  Body body = Body::fixed;
+  Eigen::Vector3d xyz_mm = Eigen::Vector3d::Zero();  ///< in UG; moving ones in LG
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+};
+
+struct CampaignResult {
+  Network network;  ///< what was adjusted; photographs as in CampaignObservations
+  AdjustmentResult adjusted;
+  DatumFrame UG, LG;
+  std::vector<MeasuredPose> poses;
+  std::vector<MeasuredPhotograph> photographs;
+  std::vector<MeasuredLength> bars, checks;
+  std::vector<MeasuredPoint> points;
+  std::vector<std::string> warnings;  ///< of the campaign as a whole
+
+  /// Covariance of the parameters (mm, rad) of two poses by index; zero if one has no pose.
+  [[nodiscard]] Matrix6d pose_covariance(std::size_t a, std::size_t b) const;
+
+  /// d(pose parameters)/d(common parameters, datum noise, home epoch's noise, own noise).
+  struct PoseInfluence {
+    Matrix6Xd by_common;
+    Eigen::Matrix<double, 6, 7> by_ug = Eigen::Matrix<double, 6, 7>::Zero();
+    Eigen::Matrix<double, 6, 7> by_lg = Eigen::Matrix<double, 6, 7>::Zero();
+    Matrix6d by_home = Matrix6d::Zero();
+    Matrix6d by_own = Matrix6d::Zero();
+  };
+  std::vector<PoseInfluence> influences;  ///< per pose; empty matrices where there is none
+  bool has_moving = false;                ///< the campaign has a moving body
+  double gd_mm = 0;                       ///< of LG's rule
+  int home_epoch = -1;                    ///< LG from home: the pose that defines it
+};
+
+/// Never throws for bad photographs: see the statuses. Throws InputError when options are invalid or the home
+/// pose is none of the poses.
+[[nodiscard]] CampaignResult extract_poses(const Campaign& campaign, const CampaignObservations& observations,
+                                           const ExtractOptions& options = {});
+
+}  // namespace hexcal

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace hexcal {
+
+/// A photograph of a campaign and the pose it shows.
+struct CampaignImage {
+  std::filesystem::path path;
+  std::string name;    ///< relative to the image folder, with '/'
+  std::string pose;    ///< pose id
+  std::string folder;  ///< name of the camera sub-folder it lies in; empty if none
+};
+
+/// A file that is not measured, and why.
+struct SkippedFile {
+  std::string name;
+  std::string reason;
+};
+
+struct ImageListing {
+  std::vector<std::string> poses;     ///< in natural order (2 before 10), also those without photographs
+  std::vector<CampaignImage> images;  ///< by pose, then natural order of names
+  std::vector<SkippedFile> skipped;
+};
+
+struct ListingOptions {
+  /// Sub-folders of these names tell cameras apart and are not poses.
+  std::vector<std::string> camera_folders;
+  /// (file, pose) for photographs in one flat folder; empty: folders are poses.
+  std::vector<std::pair<std::string, std::string>> table;
+};
+
+/// True for names such as DSC_0001.JPG, img.tiff, x.nef, in any case.
+[[nodiscard]] bool is_photograph_name(const std::filesystem::path& path);
+
+/// Lists the photographs below `folder`. A pose is a folder that directly holds photographs, whatever lies
+/// above it; its id is the folder's name, or its path where two have the same name. A folder without
+/// sub-folders is one pose. Hidden files, thumbnails' folders and the litter of operating systems are passed
+/// over in silence; of a RAW file and a JPEG with the same name the JPEG is taken; a photograph that lies
+/// beside pose folders is named as stray. Throws InputError if the folder does not exist or a file of the
+/// table does not.
+[[nodiscard]] ImageListing list_images(const std::filesystem::path& folder, const ListingOptions& options);
+
+/// Natural order: runs of digits compare as numbers.
+[[nodiscard]] bool natural_less(const std::string& a, const std::string& b);
+
+}  // namespace hexcal

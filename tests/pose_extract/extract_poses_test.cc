@@ -1,0 +1,353 @@
+#include "pose_extract/extract_poses.h"
+
+#include <gmock/gmock.h>
+
+#include "kinematics/geometry/input_error.h"
+#include "tests/support/campaign_scene.h"
+
+namespace hexcal {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+// A campaign on which each test plays one fault; healthy poses must stay within twice their clean error.
+class ExtractPoses : public ::testing::Test {
+ protected:
+  static constexpr double kCleanErrorMm = 0.003;  // worst of seven poses at 0.01 px noise
+
+  void SetUp() override {
+    ObservationSceneOptions options;
+    options.num_epochs = 5;
+    options.noise_px = 0.01;
+    made_ = make_campaign_scene(options);
+  }
+  [[nodiscard]] std::vector<std::size_t> photographs_of(const std::string& pose) const {
+    std::vector<std::size_t> found;
+    for (std::size_t p = 0; p < made_.observations.photographs.size(); ++p) {
+      if (made_.observations.photographs[p].pose == pose) found.push_back(p);
+    }
+    return found;
+  }
+  PhotographObservations& seen(const std::string& pose, std::size_t index) {
+    return made_.observations.photographs[photographs_of(pose).at(index)].seen;
+  }
+  CampaignResult extract() {
+    CampaignResult result = extract_poses(made_.campaign, made_.observations);
+    EXPECT_LT(worst_error_mm(made_, result), 2 * kCleanErrorMm);
+    return result;
+  }
+  static const MeasuredPose& pose(const CampaignResult& result, const std::string& id) {
+    for (const MeasuredPose& measured : result.poses) {
+      if (measured.id == id) return measured;
+    }
+    throw std::runtime_error("no pose " + id);
+  }
+  static void expect_others_ok(const CampaignResult& result, const std::string& faulty) {
+    for (const MeasuredPose& measured : result.poses) {
+      if (measured.id != faulty)
+        EXPECT_EQ(measured.status, PoseStatus::ok) << measured.id << ": " << measured.words;
+    }
+  }
+  CampaignScene made_;
+};
+
+TEST_F(ExtractPoses, CleanCampaignGivesEveryPoseAndHomeIsZero) {
+  const CampaignResult result = extract();
+  expect_others_ok(result, "");
+  EXPECT_LT(worst_error_mm(made_, result), kCleanErrorMm);
+  EXPECT_EQ(pose(result, "home").pose->vector().norm(), 0);
+  EXPECT_EQ(pose(result, "home").covariance.norm(), 0);
+  EXPECT_GT(pose(result, "p01").covariance(0, 0), 0);
+  EXPECT_EQ(pose(result, "p01").images, 3);
+  EXPECT_EQ(pose(result, "p01").markers, 10);
+  EXPECT_GT(pose(result, "p01").intersection_deg, 20);
+  EXPECT_TRUE(result.warnings.empty()) << result.warnings.front();
+}
+
+TEST_F(ExtractPoses, NoiseFreeCampaignIsExact) {
+  ObservationSceneOptions options;
+  options.num_epochs = 3;
+  made_ = make_campaign_scene(options);
+  const CampaignResult result = extract();
+  EXPECT_LT(worst_error_mm(made_, result), 1e-7);
+}
+
+TEST_F(ExtractPoses, PoseCovariancesAreHonestAndCorrelatedThroughHome) {
+  double sum = 0;
+  int count = 0;
+  double correlation = 0;
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    ObservationSceneOptions options;
+    options.num_epochs = 5;
+    options.noise_px = 0.01;
+    options.interior_sigma = 1;
+    options.seed = seed;
+    const CampaignScene made = make_campaign_scene(options);
+    const CampaignResult result = extract_poses(made.campaign, made.observations);
+    for (std::size_t e = 1; e < 5; ++e) {
+      ASSERT_TRUE(result.poses[e].pose) << result.poses[e].words;
+      const Vector6d error = pose_error(*result.poses[e].pose, true_pose(made, e));
+      sum += error.dot(result.poses[e].covariance.ldlt().solve(error)) / 6;
+      ++count;
+    }
+    const Matrix6d cross = result.pose_covariance(1, 2);
+    correlation +=
+        cross(0, 0) / std::sqrt(result.poses[1].covariance(0, 0) * result.poses[2].covariance(0, 0)) / 8;
+  }
+  EXPECT_GT(sum / count, 0.7);
+  EXPECT_LT(sum / count, 1.4);
+  EXPECT_GT(correlation, 0.2);  // both carry the home pose's noise
+}
+
+TEST_F(ExtractPoses, UnreadablePhotographIsNamedAndItsPoseGoesOn) {
+  seen("p02", 1).status = PhotographStatus::truncated;
+  seen("p02", 1).reason = "ends after 40 of 100 kB";
+  seen("p02", 1).markers.clear();
+  const CampaignResult result = extract();
+  expect_others_ok(result, "");
+  EXPECT_EQ(pose(result, "p02").images, 2);
+  EXPECT_THAT(pose(result, "p02").words, HasSubstr("ends after 40"));
+  EXPECT_EQ(result.photographs[photographs_of("p02")[1]].status, PhotoStatus::unreadable);
+}
+
+TEST_F(ExtractPoses, AllPhotographsOfAPoseUnreadable) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    seen("p02", i).status = PhotographStatus::empty;
+    seen("p02", i).markers.clear();
+  }
+  const CampaignResult result = extract();
+  expect_others_ok(result, "p02");
+  EXPECT_EQ(pose(result, "p02").status, PoseStatus::no_usable_photographs);
+  EXPECT_FALSE(pose(result, "p02").pose);
+}
+
+TEST_F(ExtractPoses, EmptyPoseFolder) {
+  made_.observations.poses.push_back("p99");
+  const CampaignResult result = extract_poses(made_.campaign, made_.observations);
+  expect_others_ok(result, "p99");
+  EXPECT_EQ(pose(result, "p99").status, PoseStatus::no_photographs);
+}
+
+TEST_F(ExtractPoses, OnePhotographGivesAPoseWithALargerSigma) {
+  const double sigma = pose(extract(), "p03").covariance(0, 0);
+  made_.observations.photographs.erase(made_.observations.photographs.begin() +
+                                       static_cast<std::ptrdiff_t>(photographs_of("p03")[2]));
+  made_.observations.photographs.erase(made_.observations.photographs.begin() +
+                                       static_cast<std::ptrdiff_t>(photographs_of("p03")[0]));
+  const CampaignResult result = extract_poses(made_.campaign, made_.observations);
+  EXPECT_EQ(pose(result, "p03").status, PoseStatus::ok);
+  EXPECT_THAT(pose(result, "p03").words, HasSubstr("one photograph only"));
+  EXPECT_GT(pose(result, "p03").covariance.trace(), 2 * sigma);
+  const Vector6d error = pose_error(*pose(result, "p03").pose, true_pose(made_, 3));
+  EXPECT_LT(error.dot(pose(result, "p03").covariance.ldlt().solve(error)), 30);
+}
+
+TEST_F(ExtractPoses, PhotographOfAnotherSizeIsRefused) {
+  seen("p01", 0).info.width_px = 3008;
+  seen("p01", 0).info.height_px = 2000;
+  const CampaignResult result = extract();
+  EXPECT_EQ(result.photographs[photographs_of("p01")[0]].status, PhotoStatus::wrong_camera);
+  EXPECT_THAT(result.photographs[photographs_of("p01")[0]].words, HasSubstr("3008 x 2000"));
+  EXPECT_EQ(pose(result, "p01").images, 2);
+}
+
+TEST_F(ExtractPoses, PhotographOfAnotherFocalLengthIsRefused) {
+  seen("p01", 2).info.focal_length_mm = 50;
+  const CampaignResult result = extract();
+  EXPECT_EQ(result.photographs[photographs_of("p01")[2]].status, PhotoStatus::wrong_camera);
+  EXPECT_THAT(result.photographs[photographs_of("p01")[2]].words, HasSubstr("focal length"));
+}
+
+TEST_F(ExtractPoses, PhotographWithoutACameraFileIsRefused) {
+  made_.observations.photographs[photographs_of("p01")[2]].camera = -1;
+  const CampaignResult result = extract();
+  EXPECT_EQ(result.photographs[photographs_of("p01")[2]].status, PhotoStatus::wrong_camera);
+}
+
+TEST_F(ExtractPoses, SamePhotographTwiceInAPoseCountsOnce) {
+  CampaignPhotograph copy = made_.observations.photographs[photographs_of("p01")[0]];
+  copy.seen.name = "p01/copy.JPG";
+  made_.observations.photographs.push_back(copy);
+  const CampaignResult result = extract();
+  EXPECT_EQ(pose(result, "p01").images, 3);
+  EXPECT_EQ(result.photographs.back().status, PhotoStatus::duplicate);
+  EXPECT_THAT(result.photographs.back().words, HasSubstr("IMG_0003"));
+}
+
+TEST_F(ExtractPoses, PoseWithThePhotographsOfHomeIsRefused) {
+  for (std::size_t i = 0; i < 3; ++i) seen("p04", i) = seen("home", i);
+  const CampaignResult result = extract();
+  expect_others_ok(result, "p04");
+  EXPECT_EQ(pose(result, "p04").status, PoseStatus::same_photographs);
+}
+
+TEST_F(ExtractPoses, PhotographWithoutMarkers) {
+  seen("p01", 1).markers.clear();
+  const CampaignResult result = extract();
+  EXPECT_EQ(result.photographs[photographs_of("p01")[1]].status, PhotoStatus::no_markers);
+  expect_others_ok(result, "");
+}
+
+TEST_F(ExtractPoses, BlurredPhotographWhoseMarkersAreNotMeasured) {
+  for (MarkerObservation& marker : seen("p01", 1).markers) marker.status = MarkerStatus::misfit;
+  const CampaignResult result = extract();
+  EXPECT_EQ(result.photographs[photographs_of("p01")[1]].status, PhotoStatus::no_markers);
+  EXPECT_THAT(result.photographs[photographs_of("p01")[1]].words, HasSubstr("misfit"));
+}
+
+TEST_F(ExtractPoses, PoseWithoutFixedMarkersIsDisconnected) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    std::erase_if(seen("p02", i).markers, [](const MarkerObservation& m) { return m.id < 100; });
+  }
+  const CampaignResult result = extract();
+  expect_others_ok(result, "p02");
+  EXPECT_EQ(pose(result, "p02").status, PoseStatus::disconnected);
+}
+
+TEST_F(ExtractPoses, PoseWithoutMovingMarkers) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    std::erase_if(seen("p02", i).markers, [](const MarkerObservation& m) { return m.id >= 100; });
+  }
+  const CampaignResult result = extract();
+  expect_others_ok(result, "p02");
+  EXPECT_EQ(pose(result, "p02").status, PoseStatus::no_moving_markers);
+}
+
+TEST_F(ExtractPoses, PhotographFiledInAWrongPoseIsFound) {
+  std::swap(seen("p02", 1), seen("p03", 1));
+  const CampaignResult result = extract_poses(made_.campaign, made_.observations);
+  EXPECT_EQ(result.photographs[photographs_of("p02")[1]].residuals.rejected > 0 ||
+                result.photographs[photographs_of("p03")[1]].residuals.rejected > 0,
+            true);
+  for (const char* id : {"p01", "p04"}) EXPECT_EQ(pose(result, id).status, PoseStatus::ok);
+  EXPECT_LT(worst_error_mm(made_, result), 3 * kCleanErrorMm);
+}
+
+TEST_F(ExtractPoses, MovedFixedMarkerIsNamed) {
+  const Rigid3 moved = Rigid3::from_translation({0.4, 0.5, -0.3}) * made_.scene.body_from_marker[2];
+  for (const std::size_t p : photographs_of("p03")) {
+    for (MarkerObservation& marker : made_.observations.photographs[p].seen.markers) {
+      if (marker.id != 2) continue;
+      Vector8d px;
+      ASSERT_TRUE(project_marker({made_.scene.true_camera, made_.scene.camera_from_fixed[p], nullptr, moved},
+                                 24, 0, SquareShape::Zero(), px, nullptr));
+      for (int c = 0; c < 4; ++c) marker.corners_px[static_cast<std::size_t>(c)] = px.segment<2>(2 * c);
+    }
+  }
+  const CampaignResult result = extract();
+  expect_others_ok(result, "");
+  EXPECT_THAT(result.warnings, Contains(HasSubstr("marker 2 stands elsewhere in pose p03")));
+}
+
+TEST_F(ExtractPoses, MarkerSeenOnceIsNamed) {
+  bool kept = false;
+  for (CampaignPhotograph& photograph : made_.observations.photographs) {
+    std::erase_if(photograph.seen.markers, [&](const MarkerObservation& m) {
+      const bool erase = m.id == 105 && kept;
+      kept = kept || m.id == 105;
+      return erase;
+    });
+  }
+  const CampaignResult result = extract();
+  EXPECT_THAT(result.warnings, Contains(HasSubstr("marker 105")));
+}
+
+TEST_F(ExtractPoses, NearlyOneDirectionIsSaid) {
+  const std::vector<std::size_t> photographs = photographs_of("p03");
+  seen("p03", 1).markers = seen("p03", 0).markers;  // two photographs from the same tripod
+  seen("p03", 2).markers.clear();
+  (void)photographs;
+  const CampaignResult result = extract_poses(made_.campaign, made_.observations);
+  EXPECT_THAT(pose(result, "p03").words, HasSubstr("nearly one direction"));
+}
+
+TEST_F(ExtractPoses, WeakGeometryIsRefusedNotTrusted) {
+  ExtractOptions options;
+  options.max_sigma_mm = 1e-6;
+  const CampaignResult result = extract_poses(made_.campaign, made_.observations, options);
+  EXPECT_EQ(pose(result, "p01").status, PoseStatus::weak_geometry);
+  EXPECT_FALSE(pose(result, "p01").pose);
+}
+
+TEST_F(ExtractPoses, HomeNotMeasuredLeavesNoDatum) {
+  for (std::size_t i = 0; i < 3; ++i) seen("home", i).markers.clear();
+  const CampaignResult result = extract_poses(made_.campaign, made_.observations);
+  EXPECT_EQ(pose(result, "p01").status, PoseStatus::no_datum);
+  EXPECT_THAT(pose(result, "p01").words, HasSubstr("home"));
+}
+
+TEST_F(ExtractPoses, UnknownHomePoseIsTheUsersError) {
+  made_.campaign.lg->home_pose = "hoem";
+  EXPECT_THROW((void)extract_poses(made_.campaign, made_.observations), InputError);
+}
+
+TEST_F(ExtractPoses, WrongNominalPointIsLeftOut) {
+  made_.campaign.ug->nominal[5].xyz_mm += Eigen::Vector3d(3, 0, 0);
+  const CampaignResult result = extract();
+  expect_others_ok(result, "");
+  EXPECT_THAT(result.warnings, Contains(HasSubstr("nominal point 1.1")));
+}
+
+TEST_F(ExtractPoses, NothingAtAllIsRefusedForEveryPose) {
+  for (CampaignPhotograph& photograph : made_.observations.photographs) photograph.seen.markers.clear();
+  const CampaignResult result = extract_poses(made_.campaign, made_.observations);
+  for (const MeasuredPose& measured : result.poses) EXPECT_NE(measured.status, PoseStatus::ok);
+}
+
+TEST_F(ExtractPoses, BarThatDisagreesWithTheMarkersIsNamed) {
+  const double length =
+      (made_.scene.body_from_marker[0].translation - made_.scene.body_from_marker[4].translation).norm();
+  made_.campaign.bars.push_back({{0, -1}, {4, -1}, length + 0.2, 0.005});
+  made_.campaign.checks.push_back({{1, -1}, {3, -1}, 10, 0});
+  const CampaignResult result = extract();
+  EXPECT_THAT(result.warnings, Contains(HasSubstr("bar 0-4")));
+  EXPECT_TRUE(result.checks.at(0).measured);
+}
+
+TEST_F(ExtractPoses, ScaleFromNominalCoordinatesOverridesMisprintedSizes) {
+  ObservationSceneOptions options;
+  options.num_epochs = 5;
+  options.noise_px = 0.01;
+  options.print_scale = 0.01;
+  made_ = make_campaign_scene(options);
+  const CampaignResult with_sizes = extract_poses(made_.campaign, made_.observations);
+  EXPECT_THAT(with_sizes.warnings, Contains(HasSubstr("disagree with the scale")));
+  made_.campaign.scale = ScaleFrom::nominal;
+  const CampaignResult result = extract();
+  EXPECT_NEAR(result.UG.scale, 1.01, 1e-4);
+}
+
+TEST_F(ExtractPoses, OnlyFixedMarkersIsAPlainPhotogrammetryProject) {
+  made_.campaign.moving.clear();
+  made_.campaign.lg.reset();
+  made_.campaign.checks.push_back({{0, 0}, {9, 2}, 100, 0});
+  const CampaignResult result = extract_poses(made_.campaign, made_.observations);
+  EXPECT_EQ(result.points.size(), 40U);
+  EXPECT_TRUE(result.checks.at(0).measured);
+  EXPECT_TRUE(result.photographs.at(0).UG_from_camera.has_value());
+}
+
+TEST_F(ExtractPoses, LgFromNominalCoordinates) {
+  FrameRule lg;
+  lg.gd_mm = 50;
+  for (std::size_t m = 10; m < 20; ++m) {
+    for (int c = 0; c < 4; ++c) {
+      // LG is the moving body's own frame shifted by a millimetre.
+      lg.nominal.push_back({{made_.scene.network.markers[m].id, c},
+                            made_.scene.body_from_marker[m] * corner_in_marker(c, 24, SquareShape::Zero()) +
+                                Eigen::Vector3d(1, 0, 0),
+                            0.001});
+    }
+  }
+  made_.campaign.lg = lg;
+  const CampaignResult result = extract_poses(made_.campaign, made_.observations);
+  for (std::size_t e = 0; e < 5; ++e) {
+    ASSERT_TRUE(result.poses[e].pose) << result.poses[e].words;
+    const Rigid3 truth = made_.scene.fixed_from_moving[e] * Rigid3::from_translation({-1, 0, 0});
+    EXPECT_LT((ug_from_lg(*result.poses[e].pose, 50).translation - truth.translation).norm(), 0.004);
+  }
+}
+
+}  // namespace
+}  // namespace hexcal

@@ -1,0 +1,235 @@
+#include "tools/hexcal/campaign_measurement.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <set>
+
+#include "kinematics/geometry/input_error.h"
+#include "photogrammetry/photograph/sha256.h"
+#include "tools/hexcal/capture_groups.h"
+#include "tools/hexcal/version.h"
+#include "tools/io/atomic_file.h"
+#include "tools/io/camera_file.h"
+#include "tools/io/campaign_file.h"
+#include "tools/io/observations_file.h"
+
+namespace hexcal {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr int kCacheFormat = 1;  // counts up when detection changes what it finds
+
+// The camera a photograph is for: by folder, by the body's serial number, or the only one.
+int camera_of(const Campaign& campaign, const CampaignImage& image) {
+  const auto& cameras = campaign.cameras;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    if (!cameras[c].folder.empty() && cameras[c].folder == image.folder) return static_cast<int>(c);
+  }
+  const bool by_serial =
+      std::any_of(cameras.begin(), cameras.end(), [](const CampaignCamera& c) { return !c.serial.empty(); });
+  if (by_serial) {
+    const std::string serial = read_photograph_info(image.path).serial.value_or("");
+    for (std::size_t c = 0; c < cameras.size(); ++c) {
+      if (!cameras[c].serial.empty() && cameras[c].serial == serial) return static_cast<int>(c);
+    }
+  }
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    if (cameras[c].serial.empty() && cameras[c].folder.empty()) return static_cast<int>(c);
+  }
+  return -1;
+}
+
+std::string ids_text(const std::vector<int>& ids) {
+  std::string text;
+  for (const int id : ids) text += fmt::format(" {}", id);
+  return text;
+}
+
+fs::path cache_file(const OpenCampaign& open, const std::string& photograph_sha256, int camera) {
+  const std::string key = fmt::format("{} {} {} {} {}{}", kCacheFormat, kVersion, photograph_sha256,
+                                      open.camera_sha256[static_cast<std::size_t>(camera)],
+                                      open.campaign.family, ids_text(open.detection.ids));
+  return open.results / "cache" / (sha256_hex(key) + ".txt");
+}
+
+std::optional<PhotographObservations> cached(const fs::path& file) {
+  if (!fs::exists(file)) return std::nullopt;
+  try {
+    DetectionSet set = read_observations(file);
+    if (set.photographs.size() == 1) return std::move(set.photographs.front());
+  } catch (const InputError&) {
+    // A damaged entry is made anew.
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+OpenCampaign open_campaign(const MeasureRequest& request) {
+  OpenCampaign open;
+  open.campaign = read_campaign(request.campaign);
+  const Campaign& campaign = open.campaign;
+  open.results = campaign.folder / "results";
+  open.poses_csv = request.output.value_or(open.results / "poses.csv");
+  for (const CampaignCamera& camera : campaign.cameras) {
+    open.cameras.push_back(read_camera_file(camera.file));
+    open.camera_sha256.push_back(sha256_hex(read_file(camera.file)));
+  }
+  open.family = &marker_family(campaign.family);
+  for (const MarkerSizes* sizes : {&campaign.fixed, &campaign.moving}) {
+    for (const auto& [id, size] : *sizes) {
+      if (static_cast<std::size_t>(id) >= open.family->patterns.size()) {
+        throw InputError(fmt::format("{}: marker {}: {} has ids 0 to {}", campaign.file.string(), id,
+                                     campaign.family, open.family->patterns.size() - 1));
+      }
+      open.detection.ids.push_back(id);
+    }
+  }
+  std::sort(open.detection.ids.begin(), open.detection.ids.end());
+  if (request.observations) return open;
+
+  ListingOptions options;
+  for (const CampaignCamera& camera : campaign.cameras) {
+    if (!camera.folder.empty()) options.camera_folders.push_back(camera.folder);
+  }
+  const fs::path images = request.poses_dir.value_or(campaign.images);
+  if (campaign.images_table && !request.poses_dir) {
+    for (const ImageRow& row : read_images_table(*campaign.images_table))
+      options.table.emplace_back(row.file, row.pose);
+  }
+  if (request.group_by_time_s) options.table = group_by_capture_time(images, *request.group_by_time_s);
+  open.listing = list_images(images, options);
+  if (open.listing.images.empty() && !request.allow_empty) {
+    throw InputError(fmt::format("{}: holds no photographs", images.string()));
+  }
+  for (const CampaignImage& image : open.listing.images)
+    open.camera_of_image.push_back(camera_of(campaign, image));
+  return open;
+}
+
+CampaignLock::CampaignLock(const fs::path& results) {
+  std::error_code error;
+  fs::create_directories(results, error);
+  const fs::path path = results / ".lock";
+  file_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (file_ < 0) throw InputError(fmt::format("{}: cannot be written", path.string()));
+  if (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
+    ::close(file_);
+    throw InputError(fmt::format("{}: another hexcal is working on this campaign; wait for it or stop it",
+                                 results.parent_path().string()));
+  }
+}
+
+CampaignLock::~CampaignLock() {
+  if (file_ >= 0) ::close(file_);
+}
+
+PhotographObservations observe_image(const OpenCampaign& open, std::size_t image, bool use_cache) {
+  const CampaignImage& entry = open.listing.images[image];
+  const int camera = open.camera_of_image[image];
+  std::string sha;
+  std::error_code error;
+  if (use_cache && camera >= 0 && fs::file_size(entry.path, error) > 0 && !error) {
+    sha = sha256_hex(read_file(entry.path));
+    if (auto found = cached(cache_file(open, sha, camera))) {
+      found->name = entry.name;
+      return *found;
+    }
+  }
+  const Photograph photograph = read_photograph(entry.path);
+  const CameraModel* model = camera >= 0 ? &open.cameras[static_cast<std::size_t>(camera)].model : nullptr;
+  // A lens of another frame size would mislead the refiner; screening names the photograph.
+  const bool fits =
+      model != nullptr && photograph.grey.cols == model->width_px && photograph.grey.rows == model->height_px;
+  PhotographObservations seen;
+  if (photograph.status == PhotographStatus::ok && !fits) {
+    seen.status = photograph.status;
+    seen.info = photograph.info;
+    seen.info.width_px = photograph.grey.cols;
+    seen.info.height_px = photograph.grey.rows;
+    seen.sha256 = photograph.sha256;
+  } else {
+    seen = observe_photograph(photograph, *open.family, open.detection, model);
+  }
+  seen.name = entry.name;
+  if (use_cache && fits && seen.status == PhotographStatus::ok && seen.sha256 == sha) {
+    write_file_atomically(
+        cache_file(open, sha, camera),
+        observations_text(
+            {open.campaign.family, open.camera_sha256[static_cast<std::size_t>(camera)], {seen}}));
+  }
+  return seen;
+}
+
+ExtractOptions extract_options(const MeasureRequest& request) {
+  ExtractOptions options;
+  if (request.interior_fixed) options.adjustment.interior = AdjustmentOptions::Interior::fixed;
+  return options;
+}
+
+CampaignObservations observe_campaign(const MeasureRequest& request, const OpenCampaign& open,
+                                      const std::function<void()>& advance) {
+  CampaignObservations observations;
+  observations.cameras = open.cameras;
+  observations.poses = open.listing.poses;
+  observations.photographs.resize(open.listing.images.size());
+  tbb::task_arena arena(request.threads > 0 ? request.threads : tbb::task_arena::automatic);
+  arena.execute([&] {
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, open.listing.images.size(), 1),
+        [&](const tbb::blocked_range<std::size_t>& range) {
+          for (std::size_t i = range.begin(); i < range.end(); ++i) {
+            // Isolated, so that a thread that waits inside does not begin another photograph: memory.
+            tbb::this_task_arena::isolate([&] {
+              observations.photographs[i] = {open.listing.images[i].pose, open.camera_of_image[i],
+                                             observe_image(open, i, request.cache)};
+            });
+            if (advance) advance();
+          }
+        },
+        tbb::simple_partitioner());
+  });
+  return observations;
+}
+
+CampaignObservations campaign_observations(const fs::path& file, OpenCampaign& open) {
+  const DetectionSet set = read_observations(file);
+  if (set.family != open.campaign.family) {
+    throw InputError(fmt::format("{}: found family {}, the campaign's is {}", file.string(), set.family,
+                                 open.campaign.family));
+  }
+  if (!set.camera_sha256.empty() && open.cameras.size() == 1 && set.camera_sha256 != open.camera_sha256[0]) {
+    throw InputError(fmt::format("{}: was detected with another camera file than {}", file.string(),
+                                 open.campaign.cameras[0].file.string()));
+  }
+  CampaignObservations observations;
+  observations.cameras = open.cameras;
+  std::set<std::string> poses;
+  for (const PhotographObservations& seen : set.photographs) {
+    const std::string pose = fs::path(seen.name).parent_path().filename().string();
+    if (pose.empty()) {
+      throw InputError(fmt::format("{}: photograph '{}': wanted its pose's folder before the name",
+                                   file.string(), seen.name));
+    }
+    poses.insert(pose);
+    int camera = 0;
+    for (std::size_t c = 0; c < open.campaign.cameras.size(); ++c) {
+      const CampaignCamera& known = open.campaign.cameras[c];
+      if (!known.serial.empty() && known.serial == seen.info.serial.value_or(""))
+        camera = static_cast<int>(c);
+    }
+    observations.photographs.push_back({pose, camera, seen});
+  }
+  observations.poses.assign(poses.begin(), poses.end());
+  std::sort(observations.poses.begin(), observations.poses.end(), natural_less);
+  open.listing.poses = observations.poses;
+  return observations;
+}
+
+}  // namespace hexcal

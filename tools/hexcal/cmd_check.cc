@@ -1,0 +1,146 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <map>
+#include <memory>
+#include <set>
+
+#include "kinematics/geometry/input_error.h"
+#include "tools/hexcal/campaign_measurement.h"
+#include "tools/hexcal/commands.h"
+#include "tools/hexcal/terminal.h"
+#include "tools/io/hexapod_file.h"
+#include "tools/io/pose_table.h"
+
+namespace hexcal {
+namespace {
+
+// Problems found on the way; a file that cannot be read at all ends the command through InputError instead.
+class Findings {
+ public:
+  void good(const std::string& line) { fmt::print("{} {}\n", coloured("ok  ", Colour::good), line); }
+  void bad(const std::string& line) {
+    fmt::print("{} {}\n", coloured("BAD ", Colour::bad), line);
+    ++bad_;
+  }
+  void warn(const std::string& line) { fmt::print("{} {}\n", coloured("warn", Colour::warning), line); }
+  [[nodiscard]] int count() const { return bad_; }
+
+  // Runs a reader whose failure is one finding among others.
+  template <class Reader>
+  void expect(const std::string& what, const Reader& reader) {
+    try {
+      good(what + ": " + reader());
+    } catch (const InputError& error) {
+      bad(error.what());
+    }
+  }
+
+ private:
+  int bad_ = 0;
+};
+
+void check_photographs(const OpenCampaign& open, Findings& findings) {
+  for (std::size_t i = 0; i < open.listing.images.size(); ++i) {
+    const CampaignImage& image = open.listing.images[i];
+    const int index = open.camera_of_image[i];
+    if (index < 0) {
+      findings.bad(fmt::format("{}: no camera file is for it", image.name));
+      continue;
+    }
+    const CalibratedCamera& camera = open.cameras[static_cast<std::size_t>(index)];
+    const PhotographInfo info = read_photograph_info(image.path);
+    if (info.width_px != camera.model.width_px || info.height_px != camera.model.height_px) {
+      findings.bad(fmt::format("{}: {} x {} px, the camera file is for {} x {}", image.name, info.width_px,
+                               info.height_px, camera.model.width_px, camera.model.height_px));
+      continue;
+    }
+    for (const SettingDifference& difference : compare_setting(camera.setting, info)) {
+      const std::string line = fmt::format("{}: {}", image.name, difference.words);
+      difference.fatal ? findings.bad(line) : findings.warn(line);
+    }
+  }
+}
+
+void check_poses(const OpenCampaign& open, Findings& findings) {
+  std::map<std::string, int> photographs;
+  for (const CampaignImage& image : open.listing.images) ++photographs[image.pose];
+  for (const std::string& pose : open.listing.poses) {
+    const int count = photographs[pose];
+    const std::string line = fmt::format("pose {}: {} photographs", pose, count);
+    if (count == 0) {
+      findings.bad(line);
+    } else if (count < 2) {
+      findings.warn(line + ", wanted at least 2");
+    } else {
+      findings.good(line);
+    }
+  }
+  for (const SkippedFile& file : open.listing.skipped)
+    findings.warn(fmt::format("{}: {}", file.name, file.reason));
+  const auto& lg = open.campaign.lg;
+  if (lg && lg->from == FrameRule::From::home && photographs[lg->home_pose] == 0) {
+    findings.bad(fmt::format("home pose '{}' has no photographs; poses: {}", lg->home_pose,
+                             fmt::join(open.listing.poses, ", ")));
+  }
+}
+
+void check_targets(const OpenCampaign& open, const std::filesystem::path& path, Findings& findings) {
+  findings.expect(path.string(), [&] {
+    const std::vector<PoseRecord> targets = read_pose_table(path);
+    std::set<std::string> known(open.listing.poses.begin(), open.listing.poses.end());
+    for (const PoseRecord& target : targets) {
+      if (known.count(target.id) == 0) findings.warn(fmt::format("target {}: has no photographs", target.id));
+    }
+    return fmt::format("{} targets", targets.size());
+  });
+}
+
+int check(const MeasureRequest& request) {
+  const OpenCampaign open = open_campaign(request);
+  const Campaign& campaign = open.campaign;
+  Findings findings;
+  findings.good(fmt::format("{}: {} fixed and {} moving markers of {}", campaign.file.string(),
+                            campaign.fixed.size(), campaign.moving.size(), campaign.family));
+  for (std::size_t c = 0; c < open.cameras.size(); ++c) {
+    const CalibratedCamera& camera = open.cameras[c];
+    const std::string line = fmt::format("{}: {} x {} px, f {:.1f} px, {}", campaign.cameras[c].file.string(),
+                                         camera.model.width_px, camera.model.height_px, camera.model.fy_px(),
+                                         lens_model_name(camera.model.lens));
+    camera.covariance.size() > 0 ? findings.good(line)
+                                 : findings.warn(line + "; no covariance: sigmas of poses will be too small");
+  }
+  if (campaign.hexapod) {
+    findings.expect(campaign.hexapod->string(), [&] {
+      (void)read_hexapod_file(*campaign.hexapod);
+      return std::string("a platform of six legs");
+    });
+  }
+  if (campaign.targets) check_targets(open, *campaign.targets, findings);
+  if (campaign.legs) {
+    findings.expect(campaign.legs->string(),
+                    [&] { return fmt::format("{} rows", read_leg_table(*campaign.legs).size()); });
+  }
+  check_poses(open, findings);
+  check_photographs(open, findings);
+  fmt::print("{} photographs in {} poses; {}\n", open.listing.images.size(), open.listing.poses.size(),
+             findings.count() == 0 ? "nothing wrong found" : fmt::format("{} problems", findings.count()));
+  return findings.count() == 0 ? kDone : kSomeFailed;
+}
+
+}  // namespace
+
+void add_check_command(CLI::App& app, Action& action) {
+  CLI::App* command = app.add_subcommand(
+      "check", "What of a campaign would be used and what is wrong with it, measuring nothing");
+  command->footer(
+      "Example:\n  hexcal check campaign/\n  ok   campaign.yaml: 10 fixed and 10 moving markers of tag36h11\n"
+      "  BAD  p003/IMG_0007.JPG: focal length: camera 35 mm, photograph 50 mm\n"
+      "Exit code 0 nothing wrong, 1 problems listed, 2 a file that cannot be read.");
+  auto request = std::make_shared<MeasureRequest>();
+  command->add_option("campaign", request->campaign, "Campaign folder or its campaign.yaml")->required();
+  command->add_option("--poses-dir", request->poses_dir, "Folder of photographs instead of the campaign's");
+  command->callback([request, &action] { action = [request] { return check(*request); }; });
+}
+
+}  // namespace hexcal

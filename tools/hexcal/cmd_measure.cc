@@ -1,0 +1,105 @@
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <memory>
+
+#include "tools/hexcal/campaign_measurement.h"
+#include "tools/hexcal/commands.h"
+#include "tools/hexcal/terminal.h"
+
+namespace hexcal {
+namespace {
+
+struct MeasureFlags {
+  MeasureRequest request;
+  std::string interior = "refine";
+  bool json = false;
+  bool dry_run = false;
+  bool no_cache = false;
+};
+
+int list_only(const OpenCampaign& open) {
+  for (const std::string& pose : open.listing.poses) {
+    std::string line = pose + ":";
+    int count = 0;
+    for (const CampaignImage& image : open.listing.images) {
+      if (image.pose != pose) continue;
+      ++count;
+      line += ' ' + image.path.filename().string();
+    }
+    fmt::print("{}{}\n", line, count == 0 ? " no photographs" : count < 2 ? "  (one photograph only)" : "");
+  }
+  for (const SkippedFile& file : open.listing.skipped)
+    fmt::print("not used: {}: {}\n", file.name, file.reason);
+  return kDone;
+}
+
+int measure(MeasureFlags flags) {
+  MeasureRequest& request = flags.request;
+  request.interior_fixed = flags.interior == "fixed";
+  request.cache = !flags.no_cache;
+  OpenCampaign open = open_campaign(request);
+  if (flags.dry_run) return list_only(open);
+  const CampaignLock lock(open.results);
+  CampaignObservations observations;
+  if (request.observations) {
+    observations = campaign_observations(*request.observations, open);
+  } else {
+    ProgressBar progress("photographs", open.listing.images.size());
+    observations = observe_campaign(request, open, [&progress] { progress.advance(); });
+  }
+  const CampaignResult result = extract_poses(open.campaign, observations, extract_options(request));
+  const std::vector<std::filesystem::path> written = write_results(request, open, observations, result);
+  if (flags.json) {
+    fmt::print("{}", measurement_json(observations, result, open.listing));
+  } else {
+    fmt::print("{}", measurement_text(observations, result, open.listing));
+    for (const std::filesystem::path& path : written) fmt::print("wrote {}\n", path.string());
+  }
+  return measurement_exit_code(result);
+}
+
+}  // namespace
+
+void add_measure_command(CLI::App& app, Action& action) {
+  CLI::App* command = app.add_subcommand(
+      "measure",
+      "Photographs of a campaign to poses.csv: detection, bundle adjustment, datum frames, covariances");
+  command->footer(
+      "Example:\n  hexcal measure campaign/\n"
+      "  pose    x_mm    y_mm     z_mm  roll_deg  pitch_deg  yaw_deg  sigma_um  sigma_mdeg  photos  markers  "
+      "rms_px  "
+      "status\n"
+      "  p001  1.2034  0.5521  -3.0418    0.4121    -1.2003   0.0312      0.84        0.61       3       10  "
+      "0.0081  "
+      "ok\n"
+      "Exit code 0 done, 1 done but some poses or photographs failed (listed), 2 wrong files or flags.");
+  auto flags = std::make_shared<MeasureFlags>();
+  MeasureRequest& request = flags->request;
+  command->add_option("campaign", request.campaign, "Campaign folder or its campaign.yaml")->required();
+  command->add_option("--poses-dir", request.poses_dir,
+                      "Folder with one sub-folder of photographs per pose, instead of the campaign's");
+  command->add_option("-o,--output", request.output, "Where poses.csv goes (default: results/poses.csv)");
+  command->add_option("--observations", request.observations,
+                      "Marker observations from `hexcal detect` instead of photographs");
+  command->add_option("--group-by-time", request.group_by_time_s,
+                      "Flat folder: a pause of more than SECONDS between photographs begins a new pose");
+  command
+      ->add_option("--interior", flags->interior,
+                   "Interior orientation: refine (the calibration is its prior) or fixed")
+      ->check(CLI::IsMember({"refine", "fixed"}))
+      ->capture_default_str();
+  command
+      ->add_option("--threads", request.threads, "Photographs worked on at a time (default: all processors)")
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag("--overlays", request.overlays,
+                    "Write one JPEG per photograph with markers and residuals x200");
+  command->add_flag("--colmap", request.colmap, "Write a COLMAP text model for its viewer");
+  command->add_flag("--no-cache", flags->no_cache, "Detect again in photographs that were measured before");
+  command->add_flag("--dry-run", flags->dry_run,
+                    "List what would be measured and what is wrong with the folder");
+  command->add_flag("--json", flags->json, "Print the result as JSON");
+  command->callback([flags, &action] { action = [flags] { return measure(*flags); }; });
+}
+
+}  // namespace hexcal
