@@ -108,7 +108,9 @@ TEST(CalibrateCamera, RefusesWhatIsNoCalibration) {
   EXPECT_EQ(calibration.status, CalibrationStatus::too_few_photographs);
   EXPECT_THAT(calibration.reason, testing::HasSubstr("2 photographs"));
   EXPECT_NO_THROW(CalibrateOptions{}.validate());
-  EXPECT_THROW((CalibrateOptions{.folds = 1}.validate()), InputError);
+  CalibrateOptions one_fold;
+  one_fold.folds = 1;
+  EXPECT_THROW(one_fold.validate(), InputError);
 }
 
 // Over many calibrations the true error of projection divided by its predicted sigma has unit variance.
