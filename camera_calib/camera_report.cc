@@ -44,7 +44,7 @@ void add_view(const AdjustmentResult& fit, std::size_t v, PhotographRow& row, do
   }
   const Eigen::Vector3d& t = view.camera_from_sheet.translation;
   const Eigen::Vector3d normal = view.camera_from_sheet.rotation * Eigen::Vector3d::UnitZ();
-  row.tilt_deg = kDegPerRad * std::acos(std::clamp(-normal.dot(t.normalized()), -1.0, 1.0));
+  row.tilt_deg = kDegPerRad * std::acos(std::clamp(-normal.z(), -1.0, 1.0));
   row.distance_mm = t.norm();
 }
 

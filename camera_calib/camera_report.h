@@ -18,7 +18,7 @@ struct PhotographRow {
   int points = 0;      ///< used
   int rejected = 0;    ///< outliers
   double rms_px = 0;
-  double tilt_deg = 0;  ///< between the sheet's normal and the line of sight to its centre
+  double tilt_deg = 0;  ///< between the sheet and the image plane
   double distance_mm = 0;
   double blur_px = 0;  ///< median standard deviation of the point spread, 0 unknown
 };
