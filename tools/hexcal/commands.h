@@ -10,6 +10,7 @@ void add_camera_command(CLI::App& app, Action& action);
 void add_simulate_command(CLI::App& app, Action& action);
 void add_detect_command(CLI::App& app, Action& action);
 void add_check_command(CLI::App& app, Action& action);
+void add_run_command(CLI::App& app, Action& action);
 void add_measure_command(CLI::App& app, Action& action);
 void add_watch_command(CLI::App& app, Action& action);
 void add_plan_command(CLI::App& app, Action& action);

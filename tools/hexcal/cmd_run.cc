@@ -1,0 +1,65 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tools/hexcal/commands.h"
+#include "tools/hexcal/terminal.h"
+#include "tools/io/campaign_file.h"
+
+namespace hexcal {
+namespace {
+
+struct Flags {
+  std::string campaign;
+  std::string method;
+};
+
+// One of the other commands with its own flags, as if typed.
+int run_stage(void (*add)(CLI::App&, Action&), std::vector<std::string> arguments) {
+  fmt::print("{}\n", coloured("== hexcal " + fmt::format("{}", fmt::join(arguments, " ")), Colour::bold));
+  std::fflush(stdout);
+  CLI::App app;
+  Action action;
+  add(app, action);
+  std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
+  app.parse(arguments);
+  const int code = action();
+  fmt::print("\n");
+  std::fflush(stdout);
+  return code;
+}
+
+int run(const Flags& flags) {
+  const Campaign campaign = read_campaign(flags.campaign);
+  int worst = run_stage(add_measure_command, {"measure", flags.campaign});
+  if (campaign.hexapod && campaign.targets) {
+    std::vector<std::string> arguments{"compensate", flags.campaign};
+    if (!flags.method.empty()) arguments.insert(arguments.end(), {"--method", flags.method});
+    worst = std::max(worst, run_stage(add_compensate_command, arguments));
+  } else {
+    fmt::print("not compensated: campaign.yaml names no {}\n\n", campaign.hexapod ? "targets" : "hexapod");
+  }
+  return std::max(worst, run_stage(add_report_command, {"report", flags.campaign}));
+}
+
+}  // namespace
+
+void add_run_command(CLI::App& app, Action& action) {
+  const auto flags = std::make_shared<Flags>();
+  CLI::App* command =
+      app.add_subcommand("run", "Photographs in, corrected actuator commands out: the main job");
+  command->add_option("campaign", flags->campaign, "campaign folder")->required();
+  command->add_option("--method", flags->method, "as for compensate (default: auto)");
+  command->footer(
+      "The same as: hexcal measure CAMPAIGN; hexcal compensate CAMPAIGN; hexcal report CAMPAIGN.\n"
+      "Results are in CAMPAIGN/results: poses.csv, model.yaml, predicted_poses.csv, actuators.csv, "
+      "report.html.");
+  command->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+}
+
+}  // namespace hexcal
