@@ -70,7 +70,7 @@ std::string advise(const PlatformGeometry& nominal, const IdentifyResult& identi
   double turn_deg = 10;
   const ParameterSelection& selection = identified.selection;
   const PlatformGeometry& geometry = identified.machine.geometry;
-  NoiseModel noise{.leg_sigma_mm = identified.leg_sigma_mm};
+  LegNoise noise{.leg_sigma_mm = identified.leg_sigma_mm};
   for (const PoseFamily& family : pose_families(0.15 * length, turn_deg * kRadPerDeg)) {
     std::vector<ReducedPose> reduced;
     ObservationSet observations;

@@ -333,7 +333,7 @@ class Identification {
     result_.effective_parameters = equations_.information.cwiseProduct(covariance_).sum();
     const double redundancy = std::max(1.0, equations_.rows - result_.effective_parameters);
     result_.sigma0 = std::sqrt(equations_.squares / redundancy);
-    NoiseModel measured_only = noise_;
+    LegNoise measured_only = noise_;
     measured_only.leg_sigma_mm = std::min(noise_.leg_sigma_mm, options_.leg_sigma_mm);
     result_.sigma0_of_measurement = std::sqrt(
         normal_equations(reduced_, observations_, result_.weights, measured_only).squares / redundancy);
@@ -362,7 +362,7 @@ class Identification {
   const IdentifyOptions& options_;
   MachineModel nominal_;
   IdentifyResult result_;
-  NoiseModel noise_;
+  LegNoise noise_;
   std::vector<ParameterKind> kinds_;
   Eigen::VectorXd initial_tolerances_;
   std::vector<Pose> filled_;

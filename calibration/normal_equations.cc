@@ -11,7 +11,7 @@ namespace {
 using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
 using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
 
-Vector6d noise_factors(const NoiseModel& noise) {
+Vector6d noise_factors(const LegNoise& noise) {
   Vector6d factors;
   factors << Eigen::Vector3d::Constant(noise.position_factor),
       Eigen::Vector3d::Constant(noise.orientation_factor);
@@ -20,7 +20,7 @@ Vector6d noise_factors(const NoiseModel& noise) {
 
 // A covariance may be singular, and is zero for the defining home pose: a part of the legs' own noise that no
 // measurement resolves keeps its Cholesky factor alive.
-double leg_variance(const NoiseModel& noise) {
+double leg_variance(const LegNoise& noise) {
   constexpr double kFloorMm = 1e-9;
   return std::max(noise.leg_sigma_mm * noise.leg_sigma_mm, kFloorMm * kFloorMm);
 }
@@ -63,7 +63,7 @@ ReducedPose reduce_to_observed(const LegLinearization& legs, const std::array<bo
   return reduced;
 }
 
-Matrix6d pose_covariance(const ObservationSet& observations, std::size_t index, const NoiseModel& noise) {
+Matrix6d pose_covariance(const ObservationSet& observations, std::size_t index, const LegNoise& noise) {
   const Vector6d factors = noise_factors(noise);
   return factors.asDiagonal() * observations.covariance(index) * factors.asDiagonal();
 }
@@ -75,7 +75,7 @@ double NormalEquations::Component::factor(const Eigen::MatrixXd& posterior) cons
 }
 
 NormalEquations normal_equations(const std::vector<ReducedPose>& reduced, const ObservationSet& observations,
-                                 const std::vector<double>& weights, const NoiseModel& noise,
+                                 const std::vector<double>& weights, const LegNoise& noise,
                                  const NormalEquationsRequest& request) {
   const Eigen::Index parameters = reduced.empty() ? 0 : reduced[0].jacobian.cols();
   NormalEquations sums;

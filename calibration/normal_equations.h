@@ -8,7 +8,7 @@
 namespace hexcal {
 
 /// Standard deviations that make up the covariance of the leg residuals.
-struct NoiseModel {
+struct LegNoise {
   double leg_sigma_mm = 0;
   /// Factors of the measured covariances of position and of orientation; both 1 where these are known.
   double position_factor = 1;
@@ -58,11 +58,11 @@ struct NormalEquationsRequest {
 /// `weights`: robust weight of each pose; it divides the covariance of the pose's residuals.
 [[nodiscard]] NormalEquations normal_equations(const std::vector<ReducedPose>& reduced,
                                                const ObservationSet& observations,
-                                               const std::vector<double>& weights, const NoiseModel& noise,
+                                               const std::vector<double>& weights, const LegNoise& noise,
                                                const NormalEquationsRequest& request = {});
 
 /// Covariance of the pose parameters of one pose under the noise model.
 [[nodiscard]] Matrix6d pose_covariance(const ObservationSet& observations, std::size_t index,
-                                       const NoiseModel& noise);
+                                       const LegNoise& noise);
 
 }  // namespace hexcal

@@ -42,7 +42,7 @@ bool points_can_be_free(const CalibrationState& state) { return photographs_in(s
 
 }  // namespace
 
-void CalibrateOptions::validate() const {
+void CameraCalibrationOptions::validate() const {
   if (folds < 2) throw InputError(fmt::format("calibrate: folds is {}, wanted at least 2", folds));
   if (f_hint_px && !(*f_hint_px > 0)) {
     throw InputError(fmt::format("calibrate: f_hint_px is {}, wanted more than 0", *f_hint_px));
@@ -51,7 +51,7 @@ void CalibrateOptions::validate() const {
 
 CameraCalibration rough_calibration(const std::vector<Sheet>& sheets,
                                     const std::vector<SheetPhotograph>& photographs,
-                                    const CalibrateOptions& options) {
+                                    const CameraCalibrationOptions& options) {
   options.validate();
   CameraCalibration out;
   int width = 0;
@@ -100,7 +100,7 @@ CalibrationState with_features(const CalibrationState& state,
 }
 
 CameraCalibration calibrate_camera(const std::vector<Sheet>& sheets, const CalibrationState& rough,
-                                   double rough_sigma_px, const CalibrateOptions& options) {
+                                   double rough_sigma_px, const CameraCalibrationOptions& options) {
   options.validate();
   CameraCalibration out;
   if (photographs_in(rough) < 3) {

@@ -9,7 +9,7 @@
 
 namespace hexcal {
 
-struct CalibrateOptions {
+struct CameraCalibrationOptions {
   std::optional<LensModel> lens;      ///< none: chosen by evidence
   std::optional<BoardFreedom> board;  ///< none: chosen by evidence
   std::optional<double> f_hint_px;    ///< from EXIF; used only where the views hardly determine f
@@ -44,7 +44,7 @@ struct CameraCalibration {
 /// needs.
 [[nodiscard]] CameraCalibration rough_calibration(const std::vector<Sheet>& sheets,
                                                   const std::vector<SheetPhotograph>& photographs,
-                                                  const CalibrateOptions& options = {});
+                                                  const CameraCalibrationOptions& options = {});
 
 /// The same cameras, poses and shapes with the features of `photographs`; views without usable ones go.
 [[nodiscard]] CalibrationState with_features(const CalibrationState& state,
@@ -54,6 +54,6 @@ struct CameraCalibration {
 /// Akaike criterion and by cross-validation over photographs, unless the options say which.
 [[nodiscard]] CameraCalibration calibrate_camera(const std::vector<Sheet>& sheets,
                                                  const CalibrationState& rough, double rough_sigma_px,
-                                                 const CalibrateOptions& options = {});
+                                                 const CameraCalibrationOptions& options = {});
 
 }  // namespace hexcal

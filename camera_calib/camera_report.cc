@@ -32,7 +32,7 @@ std::string status_without_view(const SheetPhotograph& photograph) {
   return "too few points of a sheet can be measured";
 }
 
-void add_view(const AdjustmentResult& fit, std::size_t v, PhotographRow& row, double& sum) {
+void add_view(const SheetAdjustmentResult& fit, std::size_t v, PhotographRow& row, double& sum) {
   const SheetView& view = fit.state.views[v];
   for (std::size_t f = 0; f < view.features.size(); ++f) {
     if (view.rejected[f] != 0) {
@@ -49,7 +49,7 @@ void add_view(const AdjustmentResult& fit, std::size_t v, PhotographRow& row, do
 }
 
 std::vector<PhotographRow> photograph_rows(const std::vector<SheetPhotograph>& photographs,
-                                           const AdjustmentResult& fit) {
+                                           const SheetAdjustmentResult& fit) {
   std::vector<PhotographRow> rows;
   for (std::size_t p = 0; p < photographs.size(); ++p) {
     PhotographRow row;
@@ -75,7 +75,7 @@ std::vector<PhotographRow> photograph_rows(const std::vector<SheetPhotograph>& p
   return rows;
 }
 
-Coverage coverage_of(const AdjustmentResult& fit) {
+Coverage coverage_of(const SheetAdjustmentResult& fit) {
   Coverage coverage;
   const CameraModel& camera = fit.state.camera;
   for (const SheetView& view : fit.state.views) {
@@ -92,8 +92,8 @@ Coverage coverage_of(const AdjustmentResult& fit) {
   return coverage;
 }
 
-std::vector<CorrelatedPair> correlated_pairs(LensModel lens, const Eigen::MatrixXd& covariance) {
-  std::vector<CorrelatedPair> out;
+std::vector<CameraCorrelation> correlated_pairs(LensModel lens, const Eigen::MatrixXd& covariance) {
+  std::vector<CameraCorrelation> out;
   const auto& names = camera_parameter_names(lens);
   for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
     for (Eigen::Index j = i + 1; j < covariance.rows(); ++j) {
@@ -113,7 +113,7 @@ std::optional<ProjectionDifference> halves_difference(const std::vector<Sheet>& 
   std::set<int> photographs;
   for (const SheetView& view : state.views) photographs.insert(view.photograph);
   if (photographs.size() < 6) return std::nullopt;
-  AdjustmentOptions options;
+  SheetAdjustmentOptions options;
   // The sheet's shape is common to both halves: held at what all photographs gave.
   options.board = BoardFreedom::ideal;
   options.free_parameters = calibration.variant.free_parameters;
@@ -126,7 +126,7 @@ std::optional<ProjectionDifference> halves_difference(const std::vector<Sheet>& 
     for (const int p : photographs) {
       if (i++ % 2 == half) wanted.insert(p);
     }
-    const AdjustmentResult fit =
+    const SheetAdjustmentResult fit =
         adjust_sheets(sheets, views_where(state, [&wanted](int p) { return wanted.count(p) != 0; }), options);
     if (!fit.converged) return std::nullopt;
     cameras.push_back(fit.state.camera);
@@ -163,7 +163,7 @@ CameraReport report_calibration(const std::vector<Sheet>& sheets,
                                 const std::vector<SheetPhotograph>& photographs,
                                 const CameraCalibration& calibration) {
   CameraReport report;
-  const AdjustmentResult& fit = calibration.fit.adjustment;
+  const SheetAdjustmentResult& fit = calibration.fit.adjustment;
   report.photographs = photograph_rows(photographs, fit);
   if (calibration.status == CalibrationStatus::ok) {
     const double sigma0 = std::max(fit.sigma0(), 1e-12);

@@ -37,7 +37,7 @@ struct Coverage {
   std::vector<int> points = std::vector<int>(kSide * kSide, 0);
 };
 
-struct CorrelatedPair {
+struct CameraCorrelation {
   std::string first, second;
   double correlation = 0;
 };
@@ -48,8 +48,8 @@ struct CameraReport {
   std::vector<PhotographRow> photographs;
   Coverage coverage;
   ProjectionUncertainty uncertainty;
-  std::vector<CorrelatedPair> correlations;    ///< over 0.95, cx and cy with pose not included
-  std::optional<ProjectionDifference> halves;  ///< between calibrations from every other photograph
+  std::vector<CameraCorrelation> correlations;  ///< over 0.95, cx and cy with pose not included
+  std::optional<ProjectionDifference> halves;   ///< between calibrations from every other photograph
   std::vector<Advice> advice;
   Eigen::MatrixXd covariance;  ///< of the camera's parameters, scaled by sigma0
 };

@@ -32,8 +32,8 @@ CalibrationState for_variant(const CalibrationState& state, const CameraVariant&
   return out;
 }
 
-AdjustmentOptions options_of(const CameraVariant& variant, double sigma_px) {
-  AdjustmentOptions options;
+SheetAdjustmentOptions options_of(const CameraVariant& variant, double sigma_px) {
+  SheetAdjustmentOptions options;
   options.board = variant.board;
   options.free_parameters = variant.free_parameters;
   options.extra_sigma_px = sigma_px;
@@ -71,7 +71,7 @@ std::vector<ModelTrial> try_variants(const std::vector<Sheet>& sheets, const Cal
   std::vector<ModelTrial> trials;
   double best = std::numeric_limits<double>::infinity();
   for (const CameraVariant& variant : variants) {
-    const AdjustmentResult fit =
+    const SheetAdjustmentResult fit =
         adjust_sheets(sheets, for_variant(state, variant), options_of(variant, sigma_px));
     ModelTrial trial;
     trial.variant = variant;
@@ -103,16 +103,16 @@ double cross_validation_px(const std::vector<Sheet>& sheets, const CalibrationSt
       out.insert(order[i]);
     }
     const CalibrationState start = for_variant(state, variant);
-    const AdjustmentResult fit =
+    const SheetAdjustmentResult fit =
         adjust_sheets(sheets, views_where(start, [&out](int p) { return out.count(p) == 0; }),
                       options_of(variant, sigma_px));
     CalibrationState held = views_where(start, [&out](int p) { return out.count(p) != 0; });
     if (!fit.converged || held.views.empty()) return std::numeric_limits<double>::infinity();
     held.camera = fit.state.camera;
     held.shapes = fit.state.shapes;
-    AdjustmentOptions poses = options_of(variant, sigma_px);
+    SheetAdjustmentOptions poses = options_of(variant, sigma_px);
     poses.only_poses = true;
-    const AdjustmentResult check = adjust_sheets(sheets, held, poses);
+    const SheetAdjustmentResult check = adjust_sheets(sheets, held, poses);
     for (std::size_t v = 0; v < check.state.views.size(); ++v) {
       for (std::size_t f = 0; f < check.residuals_px[v].size(); ++f) {
         if (check.state.views[v].rejected[f] != 0) continue;

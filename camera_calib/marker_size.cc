@@ -4,7 +4,8 @@
 
 namespace hexcal {
 
-std::optional<MarkerSizeError> marker_size_error(const Sheet& sheet, int index, const AdjustmentResult& fit) {
+std::optional<MarkerSizeError> marker_size_error(const Sheet& sheet, int index,
+                                                 const SheetAdjustmentResult& fit) {
   const CameraModel& camera = fit.state.camera;
   const std::vector<Eigen::Vector3d> points =
       shaped_points(sheet, fit.state.shapes[static_cast<std::size_t>(index)]);

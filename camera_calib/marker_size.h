@@ -14,6 +14,6 @@ struct MarkerSizeError {
 };
 
 [[nodiscard]] std::optional<MarkerSizeError> marker_size_error(const Sheet& sheet, int index,
-                                                               const AdjustmentResult& fit);
+                                                               const SheetAdjustmentResult& fit);
 
 }  // namespace hexcal

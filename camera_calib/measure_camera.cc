@@ -113,7 +113,8 @@ LensSetting common_setting(const std::vector<SheetPhotograph>& photographs,
 }  // namespace
 
 MeasuredCamera measure_camera(const std::vector<fs::path>& paths, const std::vector<Sheet>& sheets,
-                              const CalibrateOptions& options, const std::function<void()>& on_photograph) {
+                              const CameraCalibrationOptions& options,
+                              const std::function<void()>& on_photograph) {
   MeasuredCamera out;
   out.photographs.resize(paths.size());
   Pixels pixels(paths);

@@ -21,7 +21,7 @@ struct MeasuredCamera {
 /// are left out with their reason.
 [[nodiscard]] MeasuredCamera measure_camera(const std::vector<std::filesystem::path>& paths,
                                             const std::vector<Sheet>& sheets,
-                                            const CalibrateOptions& options = {},
+                                            const CameraCalibrationOptions& options = {},
                                             const std::function<void()>& on_photograph = {});
 
 }  // namespace hexcal

@@ -42,7 +42,7 @@ struct Residual {
   const FeatureObservation::Vector* px;
 };
 
-std::vector<Residual> used_residuals(const AdjustmentResult& result) {
+std::vector<Residual> used_residuals(const SheetAdjustmentResult& result) {
   std::vector<Residual> out;
   for (std::size_t v = 0; v < result.state.views.size(); ++v) {
     const SheetView& view = result.state.views[v];
@@ -71,7 +71,7 @@ double spread(const std::vector<Residual>& residuals, double extra, bool by_medi
   return *middle / redundancy_share;
 }
 
-double unexplained_sigma(const AdjustmentResult& result, bool by_median) {
+double unexplained_sigma(const SheetAdjustmentResult& result, bool by_median) {
   const std::vector<Residual> residuals = used_residuals(result);
   if (residuals.empty()) return 0;
   double coordinates = 0;
@@ -92,7 +92,7 @@ double unexplained_sigma(const AdjustmentResult& result, bool by_median) {
 }
 
 // Tests every feature anew, so that one rejected in an early round may return.
-void test_features(AdjustmentResult& result, double extra, double probability) {
+void test_features(SheetAdjustmentResult& result, double extra, double probability) {
   const double limit2 = chi2_limit(2, probability);
   const double limit8 = chi2_limit(8, probability);
   for (std::size_t v = 0; v < result.state.views.size(); ++v) {
@@ -104,8 +104,8 @@ void test_features(AdjustmentResult& result, double extra, double probability) {
   }
 }
 
-AdjustmentOptions options_of(const CameraVariant& variant, double sigma_px) {
-  AdjustmentOptions options;
+SheetAdjustmentOptions options_of(const CameraVariant& variant, double sigma_px) {
+  SheetAdjustmentOptions options;
   options.board = variant.board;
   options.free_parameters = variant.free_parameters;
   options.extra_sigma_px = sigma_px;
@@ -123,7 +123,7 @@ RobustFitResult robust_fit(const std::vector<Sheet>& sheets, const CalibrationSt
   state.camera = converted_camera(start.camera, variant.lens);
   double sigma = start_sigma_px;
   for (int round = 0; round < options.rounds; ++round) {
-    AdjustmentOptions adjust = options_of(variant, sigma);
+    SheetAdjustmentOptions adjust = options_of(variant, sigma);
     adjust.robust = options.reject && round == 0;
     out.adjustment = adjust_sheets(sheets, state, adjust);
     if (!out.adjustment.converged) return out;
@@ -133,7 +133,7 @@ RobustFitResult robust_fit(const std::vector<Sheet>& sheets, const CalibrationSt
     sigma = unexplained_sigma(out.adjustment, false);
     state = out.adjustment.state;
   }
-  AdjustmentOptions last = options_of(variant, sigma);
+  SheetAdjustmentOptions last = options_of(variant, sigma);
   last.with_covariance = options.with_covariance;
   out.adjustment = adjust_sheets(sheets, state, last);
   out.extra_sigma_px = sigma;
@@ -182,7 +182,7 @@ CameraModel converted_camera(const CameraModel& camera, LensModel lens) {
 
 RobustFitResult first_fit(const std::vector<Sheet>& sheets, const CalibrationState& start) {
   CalibrationState state = start;
-  AdjustmentOptions options;
+  SheetAdjustmentOptions options;
   options.with_covariance = false;
   options.robust = true;
   options.max_iterations = 30;
@@ -192,7 +192,7 @@ RobustFitResult first_fit(const std::vector<Sheet>& sheets, const CalibrationSta
     options.free_parameters.assign(9, false);
     for (const int i : stage) options.free_parameters[static_cast<std::size_t>(i)] = true;
     options.extra_sigma_px = sigma;
-    const AdjustmentResult result = adjust_sheets(sheets, state, options);
+    const SheetAdjustmentResult result = adjust_sheets(sheets, state, options);
     if (!result.converged) break;
     state = result.state;
     sigma = std::max(0.02, unexplained_sigma(result, true));

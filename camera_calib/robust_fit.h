@@ -23,7 +23,7 @@ struct RobustFitOptions {
 };
 
 struct RobustFitResult {
-  AdjustmentResult adjustment;
+  SheetAdjustmentResult adjustment;
   double extra_sigma_px = 0;  ///< noise beside the measured covariances that brings sigma0 to 1
 };
 

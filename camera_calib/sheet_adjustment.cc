@@ -114,7 +114,7 @@ void store(const Blocks& blocks, const std::vector<DrawnSheet>& drawn, Calibrati
   }
 }
 
-std::vector<char> free_camera(const CameraModel& camera, const AdjustmentOptions& options) {
+std::vector<char> free_camera(const CameraModel& camera, const SheetAdjustmentOptions& options) {
   if (options.only_poses) return std::vector<char>(static_cast<std::size_t>(camera.parameters.size()), false);
   return options.free_parameters.empty() ? all_but_affinity(camera.lens) : options.free_parameters;
 }
@@ -130,7 +130,7 @@ struct Network {
 };
 
 void add_camera(Network& network, Blocks& blocks, const CameraModel& camera,
-                const AdjustmentOptions& options) {
+                const SheetAdjustmentOptions& options) {
   ceres::Problem& problem = *network.problem;
   problem.AddParameterBlock(blocks.camera.data(), static_cast<int>(blocks.camera.size()));
   std::vector<int> held;
@@ -153,7 +153,7 @@ void add_camera(Network& network, Blocks& blocks, const CameraModel& camera,
 }
 
 void add_sheets(Network& network, Blocks& blocks, const std::vector<DrawnSheet>& drawn,
-                const AdjustmentOptions& options) {
+                const SheetAdjustmentOptions& options) {
   ceres::Problem& problem = *network.problem;
   const BoardFreedom board = options.only_poses ? BoardFreedom::ideal : options.board;
   for (Eigen::Matrix<double, 5, 1>& deformation : blocks.deformations) {
@@ -191,7 +191,7 @@ void add_sheets(Network& network, Blocks& blocks, const std::vector<DrawnSheet>&
 }
 
 Network build(const std::vector<DrawnSheet>& drawn, const CalibrationState& state, Blocks& blocks,
-              const AdjustmentOptions& options) {
+              const SheetAdjustmentOptions& options) {
   Network network;
   ceres::Problem::Options ownership;
   network.problem = std::make_unique<ceres::Problem>(ownership);
@@ -227,7 +227,7 @@ Network build(const std::vector<DrawnSheet>& drawn, const CalibrationState& stat
   return network;
 }
 
-bool solve(Network& network, const AdjustmentOptions& options) {
+bool solve(Network& network, const SheetAdjustmentOptions& options) {
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::DENSE_SCHUR;
   solver.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
@@ -246,7 +246,7 @@ bool solve(Network& network, const AdjustmentOptions& options) {
   return summary.IsSolutionUsable();
 }
 
-void add_residuals(const Network& network, Blocks& blocks, AdjustmentResult& result) {
+void add_residuals(const Network& network, Blocks& blocks, SheetAdjustmentResult& result) {
   for (std::size_t v = 0; v < network.models.size(); ++v) {
     const SheetView& view = result.state.views[v];
     result.residuals_px.emplace_back();
@@ -283,8 +283,8 @@ Eigen::MatrixXd with_held(const Eigen::MatrixXd& covariance, const std::vector<c
   return out;
 }
 
-void add_covariance(const Network& network, const Blocks& blocks, const AdjustmentOptions& options,
-                    AdjustmentResult& result) {
+void add_covariance(const Network& network, const Blocks& blocks, const SheetAdjustmentOptions& options,
+                    SheetAdjustmentResult& result) {
   ceres::Problem::EvaluateOptions evaluate;
   evaluate.apply_loss_function = false;
   evaluate.num_threads = 1;
@@ -332,15 +332,15 @@ std::vector<char> all_but_affinity(LensModel lens) {
   return free;
 }
 
-AdjustmentResult adjust_sheets(const std::vector<Sheet>& sheets, const CalibrationState& start,
-                               const AdjustmentOptions& options) {
+SheetAdjustmentResult adjust_sheets(const std::vector<Sheet>& sheets, const CalibrationState& start,
+                                    const SheetAdjustmentOptions& options) {
   assert(start.shapes.size() == sheets.size());
   std::vector<DrawnSheet> drawn;
   for (const Sheet& sheet : sheets) {
     const SheetGeometry geometry = sheet_geometry(sheet);
     drawn.push_back({sheet_points(geometry), 0.5 * geometry.extent_mm, geometry.extent_mm.norm()});
   }
-  AdjustmentResult result;
+  SheetAdjustmentResult result;
   result.state = start;
   Blocks blocks = blocks_from(start);
   Network network = build(drawn, start, blocks, options);

@@ -48,7 +48,7 @@ struct CalibrationState {
   std::vector<SheetShape> shapes;  ///< per sheet
 };
 
-struct AdjustmentOptions {
+struct SheetAdjustmentOptions {
   BoardFreedom board = BoardFreedom::ideal;
   /// Which camera parameters are free, by index; empty: all but the affinity.
   std::vector<char> free_parameters;
@@ -61,7 +61,7 @@ struct AdjustmentOptions {
   double point_prior_mm = 0;  ///< free points: sigma of a shift; 0: 0.5 % of the sheet's diagonal
 };
 
-struct AdjustmentResult {
+struct SheetAdjustmentResult {
   bool converged = false;
   CalibrationState state;
   std::vector<std::vector<FeatureObservation::Vector>>
@@ -81,8 +81,9 @@ struct AdjustmentResult {
 /// derivatives; Triggs et al. 2000). Lens coefficients carry a weak prior, half the image radius at the
 /// corner, that only keeps undetermined ones finite; free points carry one that fixes the seven freedoms of a
 /// free network.
-[[nodiscard]] AdjustmentResult adjust_sheets(const std::vector<Sheet>& sheets, const CalibrationState& start,
-                                             const AdjustmentOptions& options);
+[[nodiscard]] SheetAdjustmentResult adjust_sheets(const std::vector<Sheet>& sheets,
+                                                  const CalibrationState& start,
+                                                  const SheetAdjustmentOptions& options);
 
 /// Every parameter free but the affinity, which a lens of round elements does not have.
 [[nodiscard]] std::vector<char> all_but_affinity(LensModel lens);

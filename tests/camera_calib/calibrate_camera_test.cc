@@ -20,13 +20,13 @@ const std::vector<Sheet>& sheets() {
 }
 
 CameraCalibration calibrate(const std::vector<SheetPhotograph>& photographs,
-                            const CalibrateOptions& options = {}) {
+                            const CameraCalibrationOptions& options = {}) {
   const CameraCalibration rough = rough_calibration(sheets(), photographs, options);
   if (rough.status != CalibrationStatus::ok) return rough;
   return calibrate_camera(sheets(), rough.fit.adjustment.state, rough.fit.extra_sigma_px, options);
 }
 
-CameraCalibration calibrate(const SyntheticSheets& synthetic, const CalibrateOptions& options = {}) {
+CameraCalibration calibrate(const SyntheticSheets& synthetic, const CameraCalibrationOptions& options = {}) {
   return calibrate(synthetic_photographs(sheets()[0], synthetic), options);
 }
 
@@ -108,8 +108,8 @@ TEST(CalibrateCamera, RefusesWhatIsNoCalibration) {
   const CameraCalibration calibration = calibrate(two);
   EXPECT_EQ(calibration.status, CalibrationStatus::too_few_photographs);
   EXPECT_THAT(calibration.reason, testing::HasSubstr("2 photographs"));
-  EXPECT_NO_THROW(CalibrateOptions{}.validate());
-  CalibrateOptions one_fold;
+  EXPECT_NO_THROW(CameraCalibrationOptions{}.validate());
+  CameraCalibrationOptions one_fold;
   one_fold.folds = 1;
   EXPECT_THROW(one_fold.validate(), InputError);
 }
@@ -122,7 +122,7 @@ TEST(CalibrateCamera, PredictedUncertaintyIsTheErrorsUncertainty) {
   auto exact = synthetic_photographs(sheets()[0], synthetic);
   const CameraCalibration rough = rough_calibration(sheets(), exact);
   ASSERT_EQ(rough.status, CalibrationStatus::ok);
-  AdjustmentOptions options;
+  SheetAdjustmentOptions options;
   options.free_parameters = {1, 0, 1, 1, 1, 1, 1, 0, 0, 0, 1, 1};
   double sums[3] = {0, 0, 0};
   constexpr int kRuns = 60;
@@ -136,7 +136,7 @@ TEST(CalibrateCamera, PredictedUncertaintyIsTheErrorsUncertainty) {
     }
     CalibrationState start = with_features(rough.fit.adjustment.state, photographs);
     start.camera = synthetic.camera;
-    const AdjustmentResult fit = adjust_sheets(sheets(), start, options);
+    const SheetAdjustmentResult fit = adjust_sheets(sheets(), start, options);
     const ProjectionDifference error = projection_difference(synthetic.camera, fit.state.camera);
     const ProjectionUncertainty sigma = projection_uncertainty(fit.state.camera, fit.camera_covariance);
     const int cells[3][2] = {{15, 10}, {29, 10}, {29, 19}};  // centre, edge, corner
@@ -153,7 +153,7 @@ TEST(CalibrateCamera, PredictedUncertaintyIsTheErrorsUncertainty) {
 }
 
 TEST(CompareCameras, NoiseIsNotSignificantAnotherZoomIs) {
-  const CalibrateOptions radial{LensModel::radial, BoardFreedom::ideal, {}, 4};
+  const CameraCalibrationOptions radial{LensModel::radial, BoardFreedom::ideal, {}, 4};
   const CameraCalibration one = calibrate(at_35_mm(), radial);
   SyntheticSheets again = at_35_mm();
   again.seed = 7;

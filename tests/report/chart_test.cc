@@ -136,13 +136,13 @@ TEST(Chart, HeatColoursRiseInLightness) {
   }
 }
 
-TEST(Scene, StillPictureIsWellFormedAndHoldsAllParts) {
+TEST(Scene3d, StillPictureIsWellFormedAndHoldsAllParts) {
   const std::string svg = scene_svg_file(sample_scene(), 0);
   EXPECT_THAT(svg, IsWellFormedXml());
   for (const char* part : {">UG<", ">LG<", ">DSC_0000<", "marker 103"}) EXPECT_THAT(svg, HasSubstr(part));
 }
 
-TEST(Scene, EllipsoidAxesAreTheSquareRootsOfTheVariances) {
+TEST(Scene3d, EllipsoidAxesAreTheSquareRootsOfTheVariances) {
   const Eigen::Matrix3d axes = ellipsoid_half_axes(Eigen::Vector3d(4, 9, 16).asDiagonal());
   EXPECT_NEAR((axes * axes.transpose() - Eigen::Matrix3d(Eigen::Vector3d(4, 9, 16).asDiagonal())).norm(), 0,
               1e-12);

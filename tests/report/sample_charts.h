@@ -60,8 +60,8 @@ inline Chart sample_chart() {
   return chart;
 }
 
-inline Scene sample_scene() {
-  Scene scene;
+inline Scene3d sample_scene() {
+  Scene3d scene;
   scene.frames.push_back({"UG", {}});
   ScenePose pose;
   pose.id = "home </script>";

@@ -2,7 +2,8 @@
 """Checks the arrows between the modules over their #include lines.
 
 An arrow A -> B allows A to include B and whatever B may include. Also refuses file and folder names
-that name no noun, and private third-party headers in public headers of the modules.
+that name no noun, private third-party headers in public headers of the modules, and types of one name in
+two headers.
 """
 import pathlib
 import re
@@ -23,6 +24,7 @@ ARROWS = {
 }
 BANNED_NAMES = re.compile(r"(^|[_.-])(utils?|misc|common|helpers?)([_.-]|$)")
 PRIVATE_HEADERS = re.compile(r"<(ceres|pcl|apriltag|exiv2|libraw)/")
+TYPE = re.compile(r"^(?:struct|class|enum class)\s+(\w+)[^;{]*\{", re.MULTILINE)
 INCLUDE = re.compile(r'^\s*#\s*include\s+(?:"([^"]+)"|(<[^>]+>))')
 
 
@@ -40,9 +42,20 @@ def reachable(module, seen=None):
     return seen
 
 
+def repeated_types(root, tops):
+    """Types of one name in two headers: all live in one namespace, where that is undefined behaviour."""
+    places = {}
+    for top in sorted(tops - {"tests"}):
+        for file in sorted((root / top).rglob("*.h")):
+            for name in TYPE.findall(file.read_text()):
+                places.setdefault(name, []).append(file.relative_to(root).as_posix())
+    return [f"{' and '.join(files)}: both define {name}" for name, files in places.items() if len(files) > 1]
+
+
 def main(root):
     errors = []
     tops = {m.split("/")[0] for m in ARROWS} | {"tests", "samples"}
+    errors += repeated_types(root, tops)
     for top in sorted(tops):
         for file in sorted((root / top).rglob("*")):
             name = file.relative_to(root).as_posix()

@@ -72,7 +72,7 @@ std::string summary_lines(const CameraCalibration& calibration, const CameraRepo
       q.uncertainty_centre_px, q.uncertainty_corner_px, q.cross_validation_px, q.coverage_percent);
   if (!report.correlations.empty()) {
     std::vector<std::string> pairs;
-    for (const CorrelatedPair& pair : report.correlations) {
+    for (const CameraCorrelation& pair : report.correlations) {
       pairs.push_back(fmt::format("{}-{} {:.3f}", pair.first, pair.second, pair.correlation));
     }
     out += fmt::format("correlations over 0.95: {}\n", fmt::join(pairs, ", "));

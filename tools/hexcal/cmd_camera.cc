@@ -98,8 +98,8 @@ std::vector<Sheet> read_sheets(const std::vector<fs::path>& files) {
   return sheets;
 }
 
-CalibrateOptions options_of(const Flags& flags) {
-  CalibrateOptions options;
+CameraCalibrationOptions options_of(const Flags& flags) {
+  CameraCalibrationOptions options;
   if (!flags.lens.empty()) options.lens = lens_model_from_name(flags.lens);
   for (const BoardFreedom board : {BoardFreedom::ideal, BoardFreedom::warped, BoardFreedom::points}) {
     if (flags.board == board_freedom_name(board)) options.board = board;

@@ -14,7 +14,7 @@ std::string format_sheet_poses(const std::string& head, const std::vector<SheetP
   out +=
       "photograph,sheet,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg,sigma_x_mm,sigma_y_mm,sigma_z_mm,sigma_rx_deg,"
       "sigma_ry_deg,sigma_rz_deg\n";
-  const AdjustmentResult& fit = calibration.fit.adjustment;
+  const SheetAdjustmentResult& fit = calibration.fit.adjustment;
   for (std::size_t v = 0; v < fit.state.views.size(); ++v) {
     const SheetView& view = fit.state.views[v];
     const Eigen::Vector3d& t = view.camera_from_sheet.translation;
@@ -41,7 +41,7 @@ std::string format_calibration_inputs(const std::string& head, const std::vector
   std::string out = head + fmt::format("# extra_sigma_px {}\n", calibration.fit.extra_sigma_px);
   for (const Sheet& sheet : sheets) out += fmt::format("# sheet: {}\n", describe_sheet(sheet));
   out += "photograph,sha256,sheet,point,used,px,covariance_px2,residual_px\n";
-  const AdjustmentResult& fit = calibration.fit.adjustment;
+  const SheetAdjustmentResult& fit = calibration.fit.adjustment;
   std::vector<std::vector<SheetPoint>> points;
   for (const Sheet& sheet : sheets) points.push_back(sheet_points(sheet_geometry(sheet)));
   for (std::size_t v = 0; v < fit.state.views.size(); ++v) {

@@ -42,7 +42,7 @@ struct NetworkPart {
   double rms_px = 0;
   double redundancy = 0;  ///< observations beyond those needed
   std::vector<PhotographPart> photographs;
-  Scene scene;
+  Scene3d scene;
 };
 
 struct CameraPart {

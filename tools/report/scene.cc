@@ -90,7 +90,7 @@ Eigen::Matrix3d ellipsoid_half_axes(const Eigen::Matrix3d& covariance_mm2) {
   return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
 }
 
-Html html_scene(const Scene& scene) {
+Html html_scene(const Scene3d& scene) {
   const SceneBounds bounds = scene_bounds(scene);
   Json poses = Json::array();
   for (const ScenePose& pose : scene.poses) {

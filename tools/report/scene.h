@@ -46,7 +46,7 @@ struct ScenePose {
   std::vector<Eigen::Vector3d> platform_joints_mm;  ///< six, or none when the machine is not known
 };
 
-struct Scene {
+struct Scene3d {
   std::vector<SceneFrame> frames;
   std::vector<SceneMarker> markers;             ///< of the fixed body
   std::vector<Eigen::Vector3d> base_joints_mm;  ///< six or none
@@ -59,9 +59,9 @@ struct Scene {
 
 /// The view that turns, its controls, and a still picture for print and for browsers without WebGL. The page
 /// must have `with_scene`.
-[[nodiscard]] Html html_scene(const Scene& scene);
+[[nodiscard]] Html html_scene(const Scene3d& scene);
 
 /// The still picture: pose `index` seen from the front, a little to the right and above.
-[[nodiscard]] std::string scene_svg_file(const Scene& scene, std::size_t index);
+[[nodiscard]] std::string scene_svg_file(const Scene3d& scene, std::size_t index);
 
 }  // namespace hexcal

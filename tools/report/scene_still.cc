@@ -18,7 +18,7 @@ const Vector2d kStillSize(760, 560);
 // The still shows the cameras too, so it fits its scale to everything it draws.
 class StillView {
  public:
-  StillView(const Scene& scene, const ScenePose* pose, double depth, const Vector2d& size) : size_(size) {
+  StillView(const Scene3d& scene, const ScenePose* pose, double depth, const Vector2d& size) : size_(size) {
     const Vector3d towards_eye = Vector3d(std::cos(-0.9), std::sin(-0.9), 0.45).normalized();
     right_ = Vector3d::UnitZ().cross(towards_eye).normalized();
     up_ = towards_eye.cross(right_);
@@ -94,7 +94,7 @@ void draw_markers(const StillView& view, const std::vector<SceneMarker>& markers
   }
 }
 
-void draw_pose(const StillView& view, const Scene& scene, const ScenePose& pose, double depth,
+void draw_pose(const StillView& view, const Scene3d& scene, const ScenePose& pose, double depth,
                Canvas& canvas) {
   for (const SceneCamera& camera : pose.cameras) {
     const auto corners = frustum_corners(camera, depth);
@@ -117,7 +117,7 @@ void draw_pose(const StillView& view, const Scene& scene, const ScenePose& pose,
 
 }  // namespace
 
-SceneBounds scene_bounds(const Scene& scene) {
+SceneBounds scene_bounds(const Scene3d& scene) {
   Eigen::AlignedBox3d box;
   const auto add_all = [&box](const auto& points) {
     for (const Vector3d& point : points) box.extend(point);
@@ -143,7 +143,7 @@ std::array<Vector3d, 4> frustum_corners(const SceneCamera& camera, double depth_
   return out;
 }
 
-void draw_scene_still(const Scene& scene, std::size_t index, const Vector2d& size, Canvas& canvas) {
+void draw_scene_still(const Scene3d& scene, std::size_t index, const Vector2d& size, Canvas& canvas) {
   const double depth = frustum_depth(scene_bounds(scene));
   const ScenePose* pose = index < scene.poses.size() ? &scene.poses[index] : nullptr;
   const StillView view(scene, pose, depth, size);
@@ -154,13 +154,13 @@ void draw_scene_still(const Scene& scene, std::size_t index, const Vector2d& siz
   if (pose != nullptr) draw_pose(view, scene, *pose, depth, canvas);
 }
 
-std::string scene_still_svg(const Scene& scene, std::size_t index) {
+std::string scene_still_svg(const Scene3d& scene, std::size_t index) {
   SvgCanvas canvas;
   draw_scene_still(scene, index, kStillSize, canvas);
   return canvas.inline_svg(kStillSize, "Cameras, markers, grip frames and legs");
 }
 
-std::string scene_svg_file(const Scene& scene, std::size_t index) {
+std::string scene_svg_file(const Scene3d& scene, std::size_t index) {
   SvgCanvas canvas;
   draw_scene_still(scene, index, kStillSize, canvas);
   return canvas.svg_file(kStillSize, "Cameras, markers, grip frames and legs");

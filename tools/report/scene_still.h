@@ -13,14 +13,14 @@ struct SceneBounds {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double radius = 1;
 };
-[[nodiscard]] SceneBounds scene_bounds(const Scene& scene);
+[[nodiscard]] SceneBounds scene_bounds(const Scene3d& scene);
 
 /// How deep camera pyramids are drawn, mm.
 [[nodiscard]] double frustum_depth(const SceneBounds& bounds);
 [[nodiscard]] std::array<Eigen::Vector3d, 4> frustum_corners(const SceneCamera& camera, double depth_mm);
 
 /// Parallel projection of pose `index` from the front, turned to the right and seen from above.
-void draw_scene_still(const Scene& scene, std::size_t index, const Eigen::Vector2d& size, Canvas& canvas);
-[[nodiscard]] std::string scene_still_svg(const Scene& scene, std::size_t index);
+void draw_scene_still(const Scene3d& scene, std::size_t index, const Eigen::Vector2d& size, Canvas& canvas);
+[[nodiscard]] std::string scene_still_svg(const Scene3d& scene, std::size_t index);
 
 }  // namespace hexcal
