@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "kinematics/geometry/input_error.h"
@@ -24,6 +25,7 @@ constexpr double kReadmission = 0.8;       // a rejected sighting returns below 
 constexpr double kFreeShapeSigmas = 5.0;   // how clearly the F test must ask for free corners
 constexpr double kEnoughRedundancy = 100;  // from here the variance factor may also shrink the covariances
 constexpr double kInteriorProbability = 1e-4;
+constexpr double kLeastShapeSigmaMm = 1e-5;
 
 // What stays the same during one adjustment.
 struct Job {
@@ -262,6 +264,37 @@ bool loosen_interior(const Job& job, Stage& stage) {
   return true;
 }
 
+// Sizes of the shapes' priors from the shapes themselves, by variance components (Foerstner 1979): the stated
+// priors are upper limits. Shear and trapezoids stand for the stretches too, whose mean is the scale and
+// cannot be seen.
+void fit_shape_priors(const Job& job, Stage& stage) {
+  for (int i = 0; i < 4; ++i) {
+    std::array<double, 2> squares{};
+    std::array<double, 2> freedom{};
+    const std::array<double, 2> sigma{stage.settings.squareness_sigma_mm, stage.settings.flatness_sigma_mm};
+    for (std::size_t m = 0; m < stage.layout.marker_shape.size(); ++m) {
+      const int first = stage.layout.marker_shape[m];
+      for (int mode = 2; first >= 0 && mode < 6; ++mode) {
+        const std::size_t kind = mode == 5 ? 1 : 0;
+        squares[kind] += stage.geometry.shape_mm[m][mode] * stage.geometry.shape_mm[m][mode];
+        freedom[kind] += 1 - stage.covariance(first + mode, first + mode) / (sigma[kind] * sigma[kind]);
+      }
+    }
+    const auto fitted = [&](std::size_t kind, double limit) {
+      if (freedom[kind] < 1) return sigma[kind];
+      return std::clamp(std::sqrt(squares[kind] / freedom[kind]), kLeastShapeSigmaMm, limit);
+    };
+    stage.settings.squareness_sigma_mm = fitted(0, job.options.squareness_sigma_mm);
+    stage.settings.flatness_sigma_mm = fitted(1, job.options.flatness_sigma_mm);
+    solve(job, stage, 0);
+    analyse(job, stage);
+    if (std::abs(stage.settings.squareness_sigma_mm / sigma[0] - 1) < 0.02 &&
+        std::abs(stage.settings.flatness_sigma_mm / sigma[1] - 1) < 0.02) {
+      break;
+    }
+  }
+}
+
 // F test of free corners against rigid squares on the same sightings; leaves the better in `stage`.
 bool corners_ask_to_be_free(const Job& job, Stage& stage) {
   Stage free = stage;
@@ -344,6 +377,7 @@ AdjustmentResult adjust_network(const Network& network, const AdjustmentOptions&
     analyse(job, stage);
   }
   fit_variance_factor(job, stage);
+  if (free_shape) fit_shape_priors(job, stage);
   result.interior_loosened = loosen_interior(job, stage);
   if (result.interior_loosened) fit_variance_factor(job, stage);
 

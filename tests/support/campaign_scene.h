@@ -44,6 +44,8 @@ inline CampaignScene make_campaign_scene(const ObservationSceneOptions& options)
   CalibratedCamera camera;
   camera.model = made.scene.network.cameras[0].model;
   camera.covariance = made.scene.network.cameras[0].covariance;
+  camera.setting.width_px = camera.model.width_px;
+  camera.setting.height_px = camera.model.height_px;
   camera.setting.focal_length_mm = 35;
   made.observations.cameras.push_back(camera);
   for (int e = 0; e < options.num_epochs; ++e) {
