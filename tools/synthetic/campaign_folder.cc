@@ -239,6 +239,7 @@ RoundResult write_campaign(const fs::path& folder, const VirtualLaboratory& labo
     const std::vector<Shot> sheet = calibration_shots(laboratory, static_cast<int>(shots.size()) + 1);
     shots.insert(shots.end(), sheet.begin(), sheet.end());
   }
+  if (options.edit_shots) options.edit_shots(shots);
   const auto write = [&](const char* name, const std::string& text) {
     write_file_atomically(folder / name, text);
   };

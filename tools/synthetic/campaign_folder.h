@@ -20,7 +20,8 @@ struct RoundOptions {
   bool true_camera = false;             ///< camera.yaml beside campaign.yaml, as if calibrated without error
   std::optional<double> pose_noise_mm;  ///< writes results/poses.csv: true poses with this noise per axis
   std::optional<double> pose_noise_rad;
-  std::string head;  ///< first comment line of every file
+  std::function<void(std::vector<Shot>&)> edit_shots;  ///< faults for tests
+  std::string head;                                    ///< first comment line of every file
 };
 
 struct RoundResult {

@@ -123,7 +123,15 @@ Scene shot_scene(const VirtualLaboratory& laboratory, const Shot& shot) {
   if (shot.pose.empty()) {
     return sheet_scene(laboratory.options.sheet, laboratory.options.print, laboratory.options.seed);
   }
-  return rig_scene(laboratory.rig, shot.UG_from_LG);
+  Rig rig = laboratory.rig;
+  for (Sticker& sticker : rig.stickers) {
+    for (const MovedSticker& moved : shot.moved_stickers) {
+      if (moved.id == sticker.id) sticker.body_from_marker = sticker.body_from_marker * moved.marker_motion;
+    }
+  }
+  Scene scene = rig_scene(rig, shot.UG_from_LG);
+  scene.surfaces.insert(scene.surfaces.end(), shot.obstacles.begin(), shot.obstacles.end());
+  return scene;
 }
 
 cv::Mat photograph(const VirtualLaboratory& laboratory, const RayLattice& lens, const Shot& shot) {

@@ -52,9 +52,17 @@ struct VirtualLaboratory {
 
 [[nodiscard]] VirtualLaboratory make_laboratory(const SimulationOptions& options);
 
-/// One photograph to be taken.
+/// A marker that is not where it was glued, in one photograph.
+struct MovedSticker {
+  int id = 0;
+  Rigid3 marker_motion;  ///< in the marker's own frame
+};
+
+/// One photograph to be taken. Faults are injected by editing shots before they are taken
+/// (RoundOptions::edit_shots): another `pose` is a swapped folder, a large `blur_px` a shaken photograph,
+/// a shot taken out a missing view.
 struct Shot {
-  std::string pose;          ///< id; empty for a photograph of the sheet
+  std::string pose;          ///< id and so the folder; empty for a photograph of the sheet
   std::string file;          ///< DSC_0001.jpg
   Rigid3 UG_from_LG;         ///< where the moving grip stands
   Rigid3 camera_from_world;  ///< world: UG, or the sheet's frame
@@ -62,6 +70,8 @@ struct Shot {
   double exposure = 1;
   PhotographTags tags;
   std::uint64_t seed = 0;
+  std::vector<MovedSticker> moved_stickers;
+  std::vector<Surface> obstacles;  ///< in front of the rig, in UG
 };
 
 /// A pose to be photographed.

@@ -6,7 +6,7 @@
 namespace hexcal {
 namespace {
 
-constexpr int kBins = 32;
+constexpr int kBins = 48;
 
 Eigen::Vector2d lower_right(const Decal& decal) {
   return {decal.top_left_mm.x() + decal.columns * decal.cell_mm.x(),
@@ -86,20 +86,23 @@ std::vector<Eigen::Vector2d> rectangle_outline(double half_width_mm, double half
           {-half_width_mm, half_height_mm}};
 }
 
-SurfacePaint::SurfacePaint(const Surface& surface)
-    : base_albedo_(surface.albedo),
-      decals_(surface.decals),
-      low_(surface.outline_mm.front()),
-      high_(surface.outline_mm.front()) {
+SurfacePaint::SurfacePaint(const Surface& surface) : base_albedo_(surface.albedo), decals_(surface.decals) {
   const std::size_t count = surface.outline_mm.size();
   for (std::size_t i = 0; i < count; ++i) {
     const Eigen::Vector2d& a = surface.outline_mm[i];
     const Eigen::Vector2d way = surface.outline_mm[(i + 1) % count] - a;
     const Eigen::Vector2d inward(-way.y(), way.x());
     edges_.emplace_back(inward.x(), inward.y(), -inward.dot(a));
-    low_ = low_.cwiseMin(a);
-    high_ = high_.cwiseMax(a);
   }
+  // The bins cover what is printed; points beyond it fall into the outermost ones.
+  for (std::size_t i = 0; i < decals_.size(); ++i) {
+    const Eigen::Vector2d end = lower_right(decals_[i]);
+    const Eigen::Vector2d low(decals_[i].top_left_mm.x(), end.y());
+    const Eigen::Vector2d high(end.x(), decals_[i].top_left_mm.y());
+    low_ = i == 0 ? low : Eigen::Vector2d(low_.cwiseMin(low));
+    high_ = i == 0 ? high : Eigen::Vector2d(high_.cwiseMax(high));
+  }
+  if (decals_.empty()) return;
   bins_per_mm_ = (kBins * Eigen::Vector2d::Ones()).cwiseQuotient(high_ - low_);
   bins_.resize(kBins * kBins);
   for (std::size_t i = 0; i < decals_.size(); ++i) {

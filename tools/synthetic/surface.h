@@ -78,8 +78,8 @@ class SurfacePaint {
   float base_albedo_;
   std::vector<Eigen::Vector3d> edges_;  ///< inside where a x + b y + c >= 0
   std::vector<Decal> decals_;
-  Eigen::Vector2d low_, high_;
-  Eigen::Vector2d bins_per_mm_;
+  Eigen::Vector2d low_{0, 0}, high_{0, 0};
+  Eigen::Vector2d bins_per_mm_{0, 0};
   std::vector<Bin> bins_;
 };
 
