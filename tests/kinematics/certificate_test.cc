@@ -89,7 +89,7 @@ TEST(Certificate, NeverClaimsUniquenessWhereDietmaierHasAnother) {
   if (!data) GTEST_SKIP() << "without Dietmaier's postures";
   PlatformGeometry g = data->geometry;
   int unique = 0;
-  for (std::size_t k = 0; k < data->postures.size(); k += 5) {
+  for (std::size_t k = 0; k < data->postures.size(); ++k) {
     g.B_from_UG = data->postures[k];
     PoseBox box;
     box.upper << 0.2, 0.2, 0.2, 0.35, 0.35, 0.35;
