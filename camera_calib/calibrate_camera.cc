@@ -74,6 +74,17 @@ CameraCalibration rough_calibration(const std::vector<Sheet>& sheets,
   }
   out.fit = first_fit(sheets, start);
   out.variant = {LensModel::brown, all_but_affinity(LensModel::brown), BoardFreedom::ideal};
+  // Odd powers matter inside a marker near the principal point: the second measurement needs them.
+  if (out.fit.adjustment.converged && photographs_in(start) >= 5) {
+    const CameraVariant radial{LensModel::radial, all_but_affinity(LensModel::radial), BoardFreedom::ideal};
+    const RobustFitResult richer =
+        robust_fit(sheets, out.fit.adjustment.state, radial, out.fit.extra_sigma_px,
+                   {.rounds = 2, .with_covariance = false});
+    if (richer.adjustment.converged) {
+      out.fit = richer;
+      out.variant = radial;
+    }
+  }
   out.status = out.fit.adjustment.converged ? CalibrationStatus::ok : CalibrationStatus::no_solution;
   if (out.status != CalibrationStatus::ok)
     out.reason = "the adjustment found no camera that fits these photographs";

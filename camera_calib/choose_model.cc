@@ -38,7 +38,15 @@ SheetAdjustmentOptions options_of(const CameraVariant& variant, double sigma_px)
   options.free_parameters = variant.free_parameters;
   options.extra_sigma_px = sigma_px;
   options.with_covariance = false;
+  options.function_tolerance = 1e-7;
   return options;
+}
+
+// Thin-prism terms trade against the principal point and against sheets that bend from photograph to
+// photograph: they must gain a tenth, not a hundredth.
+double needed_gain(const CameraVariant& variant) {
+  const bool prism = variant.lens == LensModel::rational && variant.free_parameters.back() != 0;
+  return prism ? 1.1 : 1.0;
 }
 
 }  // namespace
@@ -133,14 +141,18 @@ std::size_t choose_trial(const std::vector<Sheet>& sheets, const CalibrationStat
   std::size_t chosen = order.front();
   std::set<int> photographs;
   for (const SheetView& view : state.views) photographs.insert(view.photograph);
-  if (trials.size() > 1 && static_cast<int>(photographs.size()) >= 2 * folds) {
-    if (order.size() > 3) order.erase(order.begin() + 3, order.end());
+  // Errors that photographs share make AICc favour the richer model: only a poorer one can still win.
+  std::vector<std::size_t> rivals{chosen};
+  for (const std::size_t i : order) {
+    if (rivals.size() < 3 && trials[i].unknowns < trials[rivals.back()].unknowns) rivals.push_back(i);
+  }
+  if (rivals.size() > 1 && static_cast<int>(photographs.size()) >= 2 * folds) {
     double best = std::numeric_limits<double>::infinity();
-    for (const std::size_t i : order) {
+    for (const std::size_t i : rivals) {
       trials[i].cross_validation_px = cross_validation_px(sheets, state, trials[i].variant, sigma_px, folds);
-      best = std::min(best, *trials[i].cross_validation_px);
+      best = std::min(best, *trials[i].cross_validation_px * needed_gain(trials[i].variant));
     }
-    chosen = *std::find_if(order.begin(), order.end(),
+    chosen = *std::find_if(rivals.rbegin(), rivals.rend(),
                            [&](std::size_t i) { return *trials[i].cross_validation_px <= 1.01 * best; });
   }
   trials[chosen].chosen = true;

@@ -20,8 +20,8 @@ namespace hexcal {
 [[nodiscard]] double cross_validation_px(const std::vector<Sheet>& sheets, const CalibrationState& state,
                                          const CameraVariant& variant, double sigma_px, int folds);
 
-/// Marks and returns the chosen trial: the smallest AICc among those whose cross-validation is within 1 % of
-/// the best. Only the three best by AICc are cross-validated.
+/// Marks and returns the chosen trial: the best by AICc, or a poorer one (at most the two next ones) whose
+/// cross-validation is within 1 % of the best. The poorest such model wins.
 std::size_t choose_trial(const std::vector<Sheet>& sheets, const CalibrationState& state, double sigma_px,
                          int folds, std::vector<ModelTrial>& trials);
 

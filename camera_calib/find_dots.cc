@@ -105,6 +105,27 @@ std::vector<std::optional<Eigen::Vector2d>> match(const Eigen::Matrix3d& image_f
   return out;
 }
 
+// From four corresponding points to all dots that lie where the sheet puts them.
+std::vector<std::optional<Eigen::Vector2d>> grow_grid(std::vector<Eigen::Vector2d> sheet_mm,
+                                                      std::vector<Eigen::Vector2d> image_px,
+                                                      const std::vector<SheetDot>& dots, double pitch_mm,
+                                                      const std::vector<Blob>& blobs) {
+  std::vector<std::optional<Eigen::Vector2d>> found;
+  for (int round = 0; round < 2; ++round) {
+    const auto homography = homography_from_points(sheet_mm, image_px);
+    if (!homography) return {};
+    found = match(*homography, dots, pitch_mm, blobs);
+    sheet_mm.clear();
+    image_px.clear();
+    for (std::size_t i = 0; i < dots.size(); ++i) {
+      if (!found[i]) continue;
+      sheet_mm.push_back(dots[i].centre_mm);
+      image_px.push_back(*found[i]);
+    }
+  }
+  return found;
+}
+
 }  // namespace
 
 std::vector<std::optional<Eigen::Vector2d>> find_ringed_dots(const cv::Mat& grey, const Sheet& sheet) {
@@ -114,30 +135,31 @@ std::vector<std::optional<Eigen::Vector2d>> find_ringed_dots(const cv::Mat& grey
   std::array<std::vector<Eigen::Vector2d>, 5> ringed;
   for (const Blob& blob : blobs)
     ringed[static_cast<std::size_t>(arcs_around(dark, blob))].push_back(blob.centre_px);
-  std::vector<Eigen::Vector2d> sheet_mm;
-  std::vector<Eigen::Vector2d> image_px;
-  for (const SheetDot& dot : dots) {
-    if (dot.ring_arcs == 0) continue;
-    const auto& candidates = ringed[static_cast<std::size_t>(dot.ring_arcs)];
-    if (candidates.size() != 1) return {};
-    sheet_mm.push_back(dot.centre_mm);
-    image_px.push_back(candidates.front());
+  std::array<Eigen::Vector2d, 5> ring_mm;
+  for (const SheetDot& dot : dots) ring_mm[static_cast<std::size_t>(dot.ring_arcs)] = dot.centre_mm;
+  // Print and floor may look like a ring: of all fours of candidates the one that explains the most dots.
+  std::vector<std::optional<Eigen::Vector2d>> best;
+  std::ptrdiff_t most = 0;
+  constexpr std::size_t kCandidates = 4;
+  for (auto& list : ringed) {
+    if (list.size() > kCandidates) list.resize(kCandidates);
   }
-  auto homography = homography_from_points(sheet_mm, image_px);
-  std::vector<std::optional<Eigen::Vector2d>> found;
-  for (int round = 0; homography && round < 2; ++round) {
-    found = match(*homography, dots, sheet.pitch_mm, blobs);
-    sheet_mm.clear();
-    image_px.clear();
-    for (std::size_t i = 0; i < dots.size(); ++i) {
-      if (!found[i]) continue;
-      sheet_mm.push_back(dots[i].centre_mm);
-      image_px.push_back(*found[i]);
+  for (const Eigen::Vector2d& one : ringed[1]) {
+    for (const Eigen::Vector2d& two : ringed[2]) {
+      for (const Eigen::Vector2d& three : ringed[3]) {
+        for (const Eigen::Vector2d& four : ringed[4]) {
+          auto found = grow_grid({ring_mm[1], ring_mm[2], ring_mm[3], ring_mm[4]}, {one, two, three, four},
+                                 dots, sheet.pitch_mm, blobs);
+          const auto seen =
+              std::count_if(found.begin(), found.end(), [](const auto& px) { return px.has_value(); });
+          if (seen <= most) continue;
+          most = seen;
+          best = std::move(found);
+        }
+      }
     }
-    homography = homography_from_points(sheet_mm, image_px);
   }
-  const auto seen = std::count_if(found.begin(), found.end(), [](const auto& px) { return px.has_value(); });
-  return 2 * seen >= static_cast<std::ptrdiff_t>(dots.size()) ? found
+  return 2 * most >= static_cast<std::ptrdiff_t>(dots.size()) ? best
                                                               : std::vector<std::optional<Eigen::Vector2d>>{};
 }
 

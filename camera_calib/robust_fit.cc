@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kMedian2 = 1.386;  // medians of chi^2 with 2 and 8 degrees of freedom
 constexpr double kMedian8 = 7.344;
+constexpr double kLeastNoisePx = 0.01;  // what no measurement of a corner is called an outlier for
 
 // Quantile of chi^2 with 2 k degrees of freedom at 1 - p: P(chi^2 > x) = exp(-x/2) sum_{i<k} (x/2)^i / i!.
 double chi2_limit(int degrees, double p) {

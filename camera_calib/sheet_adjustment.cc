@@ -236,7 +236,7 @@ bool solve(Network& network, const SheetAdjustmentOptions& options) {
   for (double* block : all) solver.linear_solver_ordering->AddElementToGroup(block, 1);
   for (double* block : network.poses) solver.linear_solver_ordering->AddElementToGroup(block, 0);
   solver.max_num_iterations = options.max_iterations;
-  solver.function_tolerance = 1e-10;
+  solver.function_tolerance = options.function_tolerance;
   solver.parameter_tolerance = 1e-12;
   solver.gradient_tolerance = 1e-14;
   solver.num_threads = 1;  // sums in one order: same input, same bytes

@@ -58,7 +58,8 @@ struct SheetAdjustmentOptions {
   bool only_poses = false;  ///< camera and boards stay: for photographs left out of a calibration
   bool with_covariance = true;
   int max_iterations = 50;
-  double point_prior_mm = 0;  ///< free points: sigma of a shift; 0: 0.5 % of the sheet's diagonal
+  double function_tolerance = 1e-10;  ///< relative change of the cost at which to stop
+  double point_prior_mm = 0;          ///< free points: sigma of a shift; 0: 0.5 % of the sheet's diagonal
 };
 
 struct SheetAdjustmentResult {
