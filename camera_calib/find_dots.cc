@@ -140,9 +140,15 @@ std::vector<std::optional<Eigen::Vector2d>> find_ringed_dots(const cv::Mat& grey
   // Print and floor may look like a ring: of all fours of candidates the one that explains the most dots.
   std::vector<std::optional<Eigen::Vector2d>> best;
   std::ptrdiff_t most = 0;
-  constexpr std::size_t kCandidates = 4;
-  for (auto& list : ringed) {
-    if (list.size() > kCandidates) list.resize(kCandidates);
+  // A ring seen too flat to be read is any dot, if it is the only one.
+  constexpr std::ptrdiff_t kCandidates = 4;
+  constexpr std::size_t kMostBlobs = 400;
+  int unread = 0;
+  for (std::size_t arcs = 1; arcs < ringed.size(); ++arcs) {
+    auto& list = ringed[arcs];
+    if (std::ssize(list) > kCandidates) list.erase(list.begin() + kCandidates, list.end());
+    if (!list.empty() || ++unread > 1 || blobs.size() > kMostBlobs) continue;
+    for (const Blob& blob : blobs) list.push_back(blob.centre_px);
   }
   for (const Eigen::Vector2d& one : ringed[1]) {
     for (const Eigen::Vector2d& two : ringed[2]) {
