@@ -162,6 +162,12 @@ CameraCalibration calibrate_camera(const std::vector<Sheet>& sheets, const Calib
       for (const ModelTrial& trial : trials) out.trials.push_back(trial);
     }
   }
+  // Last, whether pixels are square: only with a gain that noise does not give.
+  CameraVariant affine = variant;
+  affine.free_parameters[1] = 1;
+  std::vector<ModelTrial> shapes = try_variants(sheets, state, sigma, {variant, affine});
+  variant = shapes[choose_trial(sheets, state, sigma, options.folds, shapes)].variant;
+  out.trials.push_back(shapes.back());
   for (ModelTrial& trial : out.trials) trial.chosen = trial.name == variant_name(variant);
   if (variant.board == BoardFreedom::ideal) state.shapes.assign(sheets.size(), {});
   CalibrationState last = state;
