@@ -1,0 +1,153 @@
+#include <gmock/gmock.h>
+
+#include "pose_extract/datum_frame.h"
+#include "pose_extract/feature_fit.h"
+#include "tests/support/campaign_scene.h"
+
+namespace hexcal {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+// A twelve-sided grip: markers on its sides (ids 0-11) and on its end plate (ids 12-17), the frame's z its
+// axis.
+ObservationScene twelve_sided_grip(double noise_px, double lifted_mm) {
+  ObservationScene scene;
+  scene.true_camera = CameraModel(6016, 4000, 9011.0);
+  scene.network.cameras.push_back({scene.true_camera, {}});
+  scene.network.num_epochs = 1;
+  for (int i = 0; i < 12; ++i) {
+    const double azimuth = 30.0 * i * kRadPerDeg;
+    const Eigen::Vector3d outward(std::cos(azimuth), std::sin(azimuth), 0);
+    Eigen::Matrix3d r;
+    r << Eigen::Vector3d::UnitZ().cross(outward), Eigen::Vector3d::UnitZ(), outward;
+    scene.body_from_marker.emplace_back(r, Eigen::Vector3d(60 * outward + Eigen::Vector3d(0, 0, -20)));
+    scene.network.markers.push_back({i, Body::fixed, 20});
+  }
+  for (int i = 0; i < 6; ++i) {
+    const double azimuth = 60.0 * i * kRadPerDeg;
+    const double lift = i == 3 ? lifted_mm : 0;
+    scene.body_from_marker.push_back(
+        Rigid3::from_translation({35 * std::cos(azimuth), 35 * std::sin(azimuth), lift}));
+    scene.network.markers.push_back({12 + i, Body::fixed, 20});
+  }
+  std::mt19937_64 rng(5);
+  std::normal_distribution<double> normal(0.0, noise_px);
+  for (int p = 0; p < 12; ++p) {
+    const double azimuth = 30.0 * p * kRadPerDeg;
+    const Eigen::Vector3d eye(600 * std::cos(azimuth), 600 * std::sin(azimuth), 350);
+    Eigen::Matrix3d r;
+    r.col(2) = (Eigen::Vector3d(0, 0, -10) - eye).normalized();
+    r.col(0) = r.col(2).cross(Eigen::Vector3d::UnitZ()).normalized();
+    r.col(1) = r.col(2).cross(r.col(0));
+    const Rigid3 camera_from_fixed = inverse(Rigid3(r, eye));
+    NetworkPhoto photo;
+    for (std::size_t m = 0; m < scene.network.markers.size(); ++m) {
+      const Rigid3 seen_from = camera_from_fixed * scene.body_from_marker[m];
+      if (-seen_from.rotation_matrix().col(2).dot(seen_from.translation.normalized()) < 0.35) continue;
+      MarkerObservation seen;
+      Vector8d px;
+      if (!project_marker({scene.true_camera, camera_from_fixed, nullptr, scene.body_from_marker[m]}, 20, 0,
+                          SquareShape::Zero(), px, nullptr)) {
+        continue;
+      }
+      seen.id = scene.network.markers[m].id;
+      seen.status = MarkerStatus::ok;
+      seen.covariance_px2 *= 1e-4;
+      seen.side_px = 250;
+      for (int c = 0; c < 4; ++c) {
+        seen.corners_px[static_cast<std::size_t>(c)] =
+            px.segment<2>(2 * c) + Eigen::Vector2d(normal(rng), normal(rng));
+      }
+      photo.markers.push_back(seen);
+    }
+    scene.network.photos.push_back(photo);
+  }
+  return scene;
+}
+
+Feature feature(Feature::Kind kind, int first, int last) {
+  Feature out;
+  out.kind = kind;
+  for (int id = first; id <= last; ++id) out.points.push_back({id, -1});
+  return out;
+}
+
+TEST(DatumFeatures, AxisAndEndPlateOfAGripAreFoundAndALiftedStickerIsNamed) {
+  const ObservationScene scene = twelve_sided_grip(0.01, 0.1);
+  const AdjustmentResult adjusted = adjust_network(scene.network, {});
+  ASSERT_EQ(adjusted.status, AdjustmentStatus::ok) << adjusted.reason;
+  FeatureFrame features;
+  features.z = feature(Feature::Kind::cylinder, 0, 11);
+  features.z.towards = MarkerPoint{12, -1};
+  features.x.kind = Feature::Kind::line;
+  features.x.points = {{13, -1}, {12, -1}};
+  features.origin = feature(Feature::Kind::plane, 12, 17);  // where the axis meets the end plate
+  const DatumFrame frame = frame_from_features(scene.network, adjusted, Body::fixed, features);
+  ASSERT_TRUE(frame.ok) << frame.reason;
+  // The grip's own frame, up to the turn about z that the line sets.
+  const Rigid3 frame_from_true =
+      frame.frame_from_body * adjusted.geometry.body_from_marker[0] * inverse(scene.body_from_marker[0]);
+  EXPECT_LT(frame_from_true.translation.norm(), 0.010);
+  const double tilt = std::acos(std::min(1.0, frame_from_true.rotation_matrix()(2, 2)));
+  EXPECT_LT(tilt * kDegPerRad, 0.01);
+  EXPECT_THAT(frame.notes, Contains(HasSubstr("marker 15 lies 0.1")));
+  // The stated covariance explains the error of the origin.
+  const Eigen::Matrix3d covariance =
+      (frame.by_common * adjusted.common_covariance * frame.by_common.transpose()).topLeftCorner<3, 3>();
+  EXPECT_GT(covariance.trace(), 0);
+}
+
+TEST(DatumFeatures, ParallelDirectionsAreRefused) {
+  const ObservationScene scene = twelve_sided_grip(0, 0);
+  const AdjustmentResult adjusted = adjust_network(scene.network, {});
+  FeatureFrame features;
+  features.z = feature(Feature::Kind::plane, 12, 17);
+  features.x = feature(Feature::Kind::cylinder, 0, 11);
+  features.origin = feature(Feature::Kind::point, 12, 12);
+  const DatumFrame frame = frame_from_features(scene.network, adjusted, Body::fixed, features);
+  EXPECT_FALSE(frame.ok);
+  EXPECT_THAT(frame.reason, HasSubstr("parallel"));
+}
+
+TEST(FeatureFit, RecoversEachKindExactly) {
+  Eigen::Matrix3Xd points(3, 24);
+  Eigen::Matrix3Xd normals(3, 24);
+  const Rigid3 placed(quaternion_from_rotation_vector({0.4, -0.3, 0.2}), {10, -20, 30});
+  const auto fill = [&](Feature::Kind kind) {
+    for (int i = 0; i < 24; ++i) {
+      const double a = 0.37 * i;
+      const double h = 3.0 * (i % 5);
+      const Eigen::Vector3d radial(std::cos(a), std::sin(a), 0);
+      Eigen::Vector3d at = Eigen::Vector3d::Zero();
+      if (kind == Feature::Kind::plane) at = (5.0 + i) * radial;
+      if (kind == Feature::Kind::line) at = Eigen::Vector3d(0, 0, 2.0 * i);
+      if (kind == Feature::Kind::circle) at = 40 * radial;
+      if (kind == Feature::Kind::cylinder) at = 40 * radial + Eigen::Vector3d(0, 0, h);
+      if (kind == Feature::Kind::sphere) {
+        at = 40 *
+             Eigen::Vector3d(radial.x() * std::cos(h / 10), radial.y() * std::cos(h / 10), std::sin(h / 10));
+      }
+      points.col(i) = placed * at;
+      normals.col(i) = placed.rotation * radial;
+    }
+  };
+  for (const Feature::Kind kind : {Feature::Kind::plane, Feature::Kind::line, Feature::Kind::circle,
+                                   Feature::Kind::cylinder, Feature::Kind::sphere}) {
+    fill(kind);
+    const FittedFeature fitted =
+        fit_feature(kind, points, Eigen::VectorXd::Constant(24, 0.01), normals, std::vector<char>(24, 1));
+    ASSERT_TRUE(fitted.ok) << static_cast<int>(kind) << fitted.reason;
+    EXPECT_LT(fitted.form_error_mm, 1e-6) << static_cast<int>(kind);
+    if (kind != Feature::Kind::sphere) {
+      EXPECT_NEAR(std::abs(fitted.direction.dot(placed.rotation_matrix().col(2))), 1, 1e-10);
+    }
+    if (kind == Feature::Kind::circle || kind == Feature::Kind::cylinder || kind == Feature::Kind::sphere) {
+      EXPECT_NEAR(fitted.radius_mm, 40, 1e-6);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace hexcal
