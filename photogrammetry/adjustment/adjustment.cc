@@ -378,6 +378,8 @@ AdjustmentResult adjust_network(const Network& network, const AdjustmentOptions&
   }
   fit_variance_factor(job, stage);
   if (free_shape) fit_shape_priors(job, stage);
+  result.interior_chi2 =
+      interior_coordinates(stage.geometry, stage.layout).squaredNorm();  // before it is loosened
   result.interior_loosened = loosen_interior(job, stage);
   if (result.interior_loosened) fit_variance_factor(job, stage);
 
@@ -386,7 +388,6 @@ AdjustmentResult adjust_network(const Network& network, const AdjustmentOptions&
   result.iterations = stage.iterations;
   result.sigma0 = std::sqrt(stage.settings.data_variance);
   result.redundancy_total = stage.redundancy;
-  result.interior_chi2 = interior_coordinates(stage.geometry, stage.layout).squaredNorm();
   result.interior_dof = stage.settings.interior_moves ? stage.layout.num_interior : 0;
   result.geometry = stage.geometry;
   result.sightings = stage.sightings;
