@@ -81,6 +81,7 @@ MarkerPattern april_tag_pattern(apriltag_family_t* family, std::uint32_t id) {
 MarkerFamily april_tag_family(const AprilTagFamily& source) {
   MarkerFamily family{source.name, {}};
   apriltag_family_t* tags = source.create();
+  family.distance = static_cast<int>(tags->h);
   for (std::uint32_t id = 0; id < tags->ncodes; ++id) family.patterns.push_back(april_tag_pattern(tags, id));
   source.destroy(tags);
   return family;

@@ -22,6 +22,7 @@ struct MarkerPattern {
 struct MarkerFamily {
   std::string name;
   std::vector<MarkerPattern> patterns;  ///< by id
+  int distance = 0;  ///< cells by which any two differ at least in any rotation; 0: not known
 };
 
 /// All patterns of a family. Throws InputError naming the known families if the name is none of them.

@@ -139,7 +139,9 @@ MarkerDecoder::MarkerDecoder(const MarkerFamily& family, const std::vector<int>&
     if (ids.empty() || std::find(ids.begin(), ids.end(), number) != ids.end())
       codes_.push_back({words[id], number});
   }
-  max_wrong_ = std::max((smallest_distance(words, turned) - 1) / 2, 0);
+  // Families of 60 000 codes are too large to compare all pairs; those state their distance.
+  const int distance = family.distance > 0 ? family.distance : smallest_distance(words, turned);
+  max_wrong_ = std::max((distance - 1) / 2, 0);
   while (max_wrong_ > 0 && chance_hits(codes_.size(), data_cells_.size(), max_wrong_) > kMaxChanceHits)
     --max_wrong_;
 }

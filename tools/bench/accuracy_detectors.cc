@@ -1,0 +1,90 @@
+#include "tools/bench/accuracy_detectors.h"
+
+#include <apriltag/apriltag.h>
+#include <apriltag/tag36h11.h>
+
+#include <opencv2/aruco.hpp>
+
+namespace hexcal {
+namespace {
+
+MarkerObservation observation(int id, const std::array<Eigen::Vector2d, 4>& corners) {
+  MarkerObservation marker;
+  marker.id = id;
+  marker.status = MarkerStatus::ok;
+  marker.corners_px = corners;
+  return marker;
+}
+
+std::vector<MarkerObservation> hexcal_markers(const cv::Mat& grey, const MarkerFamily& family) {
+  return detect_markers(grey, ToneCurve::srgb, family);
+}
+
+std::vector<MarkerObservation> april_tags(const cv::Mat& grey, float decimate) {
+  apriltag_family_t* family = tag36h11_create();
+  apriltag_detector_t* detector = apriltag_detector_create();
+  apriltag_detector_add_family(detector, family);
+  detector->quad_decimate = decimate;
+  detector->refine_edges = true;
+  image_u8_t image{grey.cols, grey.rows, static_cast<std::int32_t>(grey.step), grey.data};
+  zarray_t* found = apriltag_detector_detect(detector, &image);
+  std::vector<MarkerObservation> markers;
+  for (int i = 0; i < zarray_size(found); ++i) {
+    apriltag_detection_t* tag = nullptr;
+    zarray_get(found, i, &tag);
+    // The library's corners run counter-clockwise from the bottom left, and its first pixel's centre is (0.5,
+    // 0.5).
+    std::array<Eigen::Vector2d, 4> corners;
+    for (std::size_t k = 0; k < 4; ++k)
+      corners[3 - k] = Eigen::Vector2d(tag->p[k][0] - 0.5, tag->p[k][1] - 0.5);
+    markers.push_back(observation(tag->id, corners));
+  }
+  apriltag_detections_destroy(found);
+  apriltag_detector_destroy(detector);
+  tag36h11_destroy(family);
+  return markers;
+}
+
+std::vector<MarkerObservation> aruco_markers(const cv::Mat& grey, cv::aruco::CornerRefineMethod method,
+                                             double shift) {
+  const auto dictionary = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_APRILTAG_36h11);
+  const auto parameters = cv::aruco::DetectorParameters::create();
+  parameters->cornerRefinementMethod = method;
+  std::vector<std::vector<cv::Point2f>> found;
+  std::vector<int> ids;
+  cv::aruco::detectMarkers(grey, dictionary, found, ids, parameters);
+  std::vector<MarkerObservation> markers;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    std::array<Eigen::Vector2d, 4> corners;
+    for (std::size_t k = 0; k < 4; ++k)
+      corners[k] = Eigen::Vector2d(found[i][k].x - shift, found[i][k].y - shift);
+    markers.push_back(observation(ids[i], corners));
+  }
+  return markers;
+}
+
+}  // namespace
+
+const std::vector<Detector>& detectors() {
+  static const std::vector<Detector> all{
+      {"hexcal", hexcal_markers},
+      {"apriltag 1", [](const cv::Mat& g, const MarkerFamily&) { return april_tags(g, 1); }},
+      {"apriltag 2", [](const cv::Mat& g, const MarkerFamily&) { return april_tags(g, 2); }},
+      {"aruco none", [](const cv::Mat& g,
+                        const MarkerFamily&) { return aruco_markers(g, cv::aruco::CORNER_REFINE_NONE, 0); }},
+      {"aruco subpix",
+       [](const cv::Mat& g, const MarkerFamily&) {
+         return aruco_markers(g, cv::aruco::CORNER_REFINE_SUBPIX, 0);
+       }},
+      {"aruco contour",
+       [](const cv::Mat& g, const MarkerFamily&) {
+         return aruco_markers(g, cv::aruco::CORNER_REFINE_CONTOUR, 0);
+       }},
+      // Its corners lie half a pixel towards the bottom right in OpenCV 4.6.
+      {"aruco apriltag", [](const cv::Mat& g, const MarkerFamily&) {
+         return aruco_markers(g, cv::aruco::CORNER_REFINE_APRILTAG, 0.5);
+       }}};
+  return all;
+}
+
+}  // namespace hexcal
