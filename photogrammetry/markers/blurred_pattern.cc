@@ -23,11 +23,15 @@ struct Lines {
 };
 
 void find_lines(double at, double sigma, int cells, Lines& lines) {
-  const int first = std::max(static_cast<int>(std::ceil(at - kReachSigmas * sigma)), 0);
-  const int last = std::min(static_cast<int>(std::floor(at + kReachSigmas * sigma)), cells);
+  // Clamped before the conversion: a fit that runs away asks for places that no int can hold.
+  const auto clamped = [cells](double line) {
+    return static_cast<int>(std::fmin(std::fmax(line, -1.0), cells + 1.0));
+  };
+  const int first = std::max(clamped(std::ceil(at - kReachSigmas * sigma)), 0);
+  const int last = std::min(clamped(std::floor(at + kReachSigmas * sigma)), cells);
   lines.count = std::max(last - first + 1, 0);
   assert(lines.count <= static_cast<int>(kMaxLines));
-  lines.first_cell = lines.count > 0 ? first - 1 : std::clamp(static_cast<int>(std::floor(at)), -1, cells);
+  lines.first_cell = lines.count > 0 ? first - 1 : std::min(clamped(std::floor(at)), cells);
   for (int i = 0; i < lines.count; ++i) {
     const auto k = static_cast<std::size_t>(i);
     lines.distance[k] = (at - (first + i)) / sigma;
