@@ -50,17 +50,19 @@ double side_of(const DecodedMarker& marker) {
          std::sqrt(2.0);
 }
 
-// Better read first.
-bool is_clearer(const DecodedMarker& a, const DecodedMarker& b) {
-  const auto rank = [](const DecodedMarker& m) {
-    return m.wrong_cells + (m.mirrored ? 1 : 0) - 2 * m.clarity;
-  };
-  return rank(a) < rank(b);
+// Better read first. The tiles of the search see only the rim of a large black border, so that its inner
+// outline reads as well as the true one: of a dark square the outer outline counts, of a bright one the
+// inner.
+double rank(const DecodedMarker& marker, bool dark_square) {
+  return marker.wrong_cells + (marker.mirrored ? 1 : 0) - 2 * marker.clarity -
+         (dark_square ? 40 : -40) * std::log(side_of(marker));
 }
 
 // One reading per place: of overlapping ones the clearest.
-std::vector<DecodedMarker> without_overlaps(std::vector<DecodedMarker> markers) {
-  std::stable_sort(markers.begin(), markers.end(), is_clearer);
+std::vector<DecodedMarker> without_overlaps(std::vector<DecodedMarker> markers, bool dark_square) {
+  std::stable_sort(markers.begin(), markers.end(), [dark_square](const auto& a, const auto& b) {
+    return rank(a, dark_square) < rank(b, dark_square);
+  });
   std::vector<DecodedMarker> kept;
   for (const auto& marker : markers) {
     const bool overlaps = std::any_of(kept.begin(), kept.end(), [&](const DecodedMarker& other) {
@@ -83,7 +85,10 @@ std::vector<DecodedMarker> read_markers(const cv::Mat& grey, const MarkerFamily&
   for (auto& marker : read) {
     if (marker) markers.push_back(*marker);
   }
-  return without_overlaps(std::move(markers));
+  const MarkerPattern& pattern = family.patterns.front();
+  const int first = static_cast<int>(std::lround(0.5 * (pattern.cells - pattern.square_cells)));
+  const bool dark_square = pattern.white[static_cast<std::size_t>(first * pattern.cells + first)] == 0;
+  return without_overlaps(std::move(markers), dark_square);
 }
 
 bool touches_frame(const DecodedMarker& marker, const cv::Mat& grey) {
@@ -191,7 +196,8 @@ std::vector<MarkerObservation> detect_markers(const cv::Mat& grey, ToneCurve ton
     if (tone == ToneCurve::srgb) photograph.tone = ToneResponse(tone, found[0], found[1]);
     if (camera == nullptr) photograph.map = PixelMap(grey.cols, grey.rows, LensStandIn{found[2], found[3]});
     tbb::parallel_for(std::size_t{0}, measured.size(), [&](std::size_t k) {
-      if (fits[k].converged) fits[k] = fit_marker_again(grey, photograph, pattern_of(k), fits[k]);
+      const bool free_lens = camera == nullptr && side_of(markers[measured[k]]) >= kSharedSidePx;
+      if (fits[k].converged) fits[k] = fit_marker_again(grey, photograph, pattern_of(k), fits[k], free_lens);
     });
   }
 

@@ -11,9 +11,11 @@ namespace hexcal {
                                         const std::array<Eigen::Vector2d, 4>& corners_px, bool free_tone,
                                         bool free_lens);
 
-/// The same marker again, from its fit with an earlier model of the photograph.
+/// The same marker again, from its fit with an earlier model of the photograph. With `free_lens` the marker's
+/// own curvature may differ a little from that of the photograph's lens stand-in.
 [[nodiscard]] PhotometricFit fit_marker_again(const cv::Mat& grey, const PhotographModel& photograph,
-                                              const MarkerPattern& pattern, const PhotometricFit& before);
+                                              const MarkerPattern& pattern, const PhotometricFit& before,
+                                              bool free_lens);
 
 /// How a photograph's residuals compare with its noise model.
 struct ResidualLevel {

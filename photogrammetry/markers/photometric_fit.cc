@@ -27,24 +27,27 @@ constexpr double kPixelVariance = 1.0 / 12;  // of the square a pixel integrates
 constexpr double kMinBlur = 0.02;            // px^2
 constexpr double kHuber = 3.0;
 constexpr double kNoLimit = 1e9;
-constexpr int kCoarsePixels = 1500;
+constexpr int kCoarsePixels = 1000;
 constexpr double kFineReachSigmas = 2.8;  // beyond, a pixel says nothing of the edge
 constexpr double kLargeSide = 300;        // px; from here on the illumination's curvature counts
 constexpr double kSmallSide = 40;  // px; from here on the blur's anisotropy can be told from the geometry
 
 // Standard deviations of what is expected before the first look; an absent one is 0.
-Vector prior_sigmas() {
+Vector prior_sigmas(double lens_sigma) {
   Vector sigma = Vector::Zero();
   sigma.segment<3>(kBlur) << 3, 0.2, 0.2;
   sigma.segment<5>(kLight) << 0.3, 0.3, 0.1, 0.1, 0.1;
-  sigma.segment<kNumShared>(kShared) << 0.5, 0.5, 0.3, 0.3;
+  sigma.segment<kNumShared>(kShared) << 0.5, 0.5, lens_sigma, lens_sigma;
   return sigma;
 }
 
 class MarkerFit {
  public:
   MarkerFit(const cv::Mat& grey, const PhotographModel& photograph, const FitRequest& request)
-      : grey_(grey), photograph_(photograph), request_(request) {}
+      : grey_(grey),
+        photograph_(photograph),
+        request_(request),
+        prior_sigmas_(prior_sigmas(request.lens_sigma)) {}
 
   PhotometricFit run() {
     PhotometricFit fit;
@@ -256,7 +259,7 @@ class MarkerFit {
   }
 
   double prior_cost() const {
-    static const Vector sigma = prior_sigmas();
+    const Vector& sigma = prior_sigmas_;
     double sum = 0;
     for (int i = 0; i < kCount; ++i) {
       if (!active_[static_cast<std::size_t>(i)] || sigma[i] == 0) continue;
@@ -305,7 +308,7 @@ class MarkerFit {
   }
 
   void add_priors(Normals& normals) const {
-    static const Vector sigma = prior_sigmas();
+    const Vector& sigma = prior_sigmas_;
     for (std::size_t k = 0; k < active_list_.size(); ++k) {
       const int i = active_list_[k];
       if (sigma[i] == 0) continue;
@@ -529,6 +532,7 @@ class MarkerFit {
   const cv::Mat& grey_;
   const PhotographModel& photograph_;
   const FitRequest& request_;
+  Vector prior_sigmas_;
   FitFrame frame_;
   cv::Rect box_;
   std::optional<PixelMapPatch> patch_;

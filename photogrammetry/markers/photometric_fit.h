@@ -33,10 +33,11 @@ struct FitRequest {
   std::array<Eigen::Vector2d, 4> corners_px{};  ///< of that square, within 0.5 px or so
   bool affine = false;                          ///< no perspective: a saddle point's small window
   bool free_tone = false;
-  bool free_lens = false;  ///< only without a camera
+  bool free_lens = false;   ///< only without a camera
+  double lens_sigma = 0.3;  ///< of the lens stand-in's parameters as they are
   /// Half the side of the window of a saddle point in cells; infinite for markers.
   double window_cells = 1e9;
-  int max_pixels = 12000;  ///< more are thinned
+  int max_pixels = 8000;  ///< more are thinned
   /// From an earlier fit whose corners these are: the coarse stage is left out.
   std::optional<FitStart> start = std::nullopt;
 };

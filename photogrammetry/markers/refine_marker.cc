@@ -14,7 +14,8 @@ namespace hexcal {
 namespace {
 
 constexpr double kNoiseMarginPx = 24;
-constexpr int kPixelsOfFirstLook = 5000;  // when the photograph's own parameters are still to be told
+constexpr double kLensSigma = 0.01;       // of a real lens about the stand-in all markers agree on
+constexpr int kPixelsOfFirstLook = 3000;  // when the photograph's own parameters are still to be told
 
 cv::Rect box_around(const std::array<Eigen::Vector2d, 4>& corners, double margin) {
   Eigen::Vector2d low = corners[0];
@@ -122,8 +123,10 @@ PhotometricFit fit_marker(const cv::Mat& grey, const PhotographModel& photograph
 }
 
 PhotometricFit fit_marker_again(const cv::Mat& grey, const PhotographModel& photograph,
-                                const MarkerPattern& pattern, const PhotometricFit& before) {
+                                const MarkerPattern& pattern, const PhotometricFit& before, bool free_lens) {
   FitRequest request{BlurredPattern(pattern), pattern.square_cells, before.corners_px};
+  request.free_lens = free_lens;
+  request.lens_sigma = kLensSigma;
   request.start = FitStart{before.blur_px, before.black, before.white};
   return fit_pattern(grey, photograph, request);
 }
