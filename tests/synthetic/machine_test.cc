@@ -34,6 +34,7 @@ TEST(VirtualMachine, HomeIsZeroByDefinition) {
 
 TEST(VirtualMachine, ErrorsAreOfTheSizeOfThePapers) {
   double range_mm = 0;
+  double range_deg = 0;
   for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6}) {
     const VirtualMachine machine = make_machine(seed, {});
     Vector6d low = Vector6d::Constant(1e9);
@@ -45,9 +46,28 @@ TEST(VirtualMachine, ErrorsAreOfTheSizeOfThePapers) {
       high = high.cwiseMax(error);
     }
     range_mm += (high - low).head<3>().norm() / std::sqrt(3.0) / 6;
+    range_deg += (high - low).tail<3>().norm() / std::sqrt(3.0) / 6 * kDegPerRad;
   }
-  EXPECT_GT(range_mm, 10);
-  EXPECT_LT(range_mm, 30);
+  EXPECT_GT(range_mm, 15);  // the paper: 19.7 mm
+  EXPECT_LT(range_mm, 25);
+  EXPECT_GT(range_deg, 8);  // the paper: 11.1 deg
+  EXPECT_LT(range_deg, 14);
+}
+
+TEST(VirtualMachine, OneDrawFollowsTheSigmas) {
+  MachineErrors errors;
+  errors.joint_sigma_mm = errors.leg_offset_sigma_mm = 0.1;
+  errors.leg_scale_sigma = 0.001;
+  errors.draws = 1;
+  double squares = 0;
+  for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6, 7, 8}) {
+    const VirtualMachine machine = make_machine(seed, errors);
+    for (std::size_t i = 0; i < 6; ++i) {
+      squares +=
+          (machine.as_built.base_joints_mm[i] - machine.nominal.base_joints_mm[i]).squaredNorm() / (8 * 18);
+    }
+  }
+  EXPECT_NEAR(std::sqrt(squares), 0.1, 0.03);
 }
 
 TEST(VirtualMachine, BacklashDependsOnTheWay) {

@@ -112,6 +112,10 @@ void add_simulate_command(CLI::App& app, Action& action) {
       ->capture_default_str();
   command->add_option("--leg-scale", options.machine.leg_scale_sigma, "relative sigma of each leg's scale")
       ->capture_default_str();
+  command
+      ->add_option("--machine-draws", options.machine.draws,
+                   "of so many machines the one whose errors are most like the paper's; 1: follow the sigmas")
+      ->capture_default_str();
   command->add_option("--stroke-wave-mm", options.machine.stroke_wave_mm, "periodic leg error (not modelled)")
       ->capture_default_str();
   command->add_option("--backlash-mm", options.machine.backlash_mm, "leg play (not modelled)")

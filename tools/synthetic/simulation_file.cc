@@ -25,9 +25,9 @@ std::string format_simulation_file(const std::string& head, const SimulationOpti
       o.markers.family, o.markers.size_mm, o.markers.first_fixed_id, o.markers.first_moving_id,
       o.markers.position_sigma_mm, o.markers.angle_sigma_deg);
   text += fmt::format(
-      "machine: {{joint_sigma_mm: {}, leg_offset_sigma_mm: {}, leg_scale_sigma: {}, stroke_wave_mm: {}, "
-      "backlash_mm: {}, leg_compliance_mm_per_n: {}, payload_n: {}}}\n",
-      o.machine.joint_sigma_mm, o.machine.leg_offset_sigma_mm, o.machine.leg_scale_sigma,
+      "machine: {{joint_sigma_mm: {}, leg_offset_sigma_mm: {}, leg_scale_sigma: {}, draws: {}, "
+      "stroke_wave_mm: {}, backlash_mm: {}, leg_compliance_mm_per_n: {}, payload_n: {}}}\n",
+      o.machine.joint_sigma_mm, o.machine.leg_offset_sigma_mm, o.machine.leg_scale_sigma, o.machine.draws,
       o.machine.stroke_wave_mm, o.machine.backlash_mm, o.machine.leg_compliance_mm_per_n,
       o.machine.payload_n);
   text += fmt::format("sensor: {{full_well_electrons: {}, read_noise: {}, tone: {}, sharpening: {}}}\n",
@@ -68,6 +68,7 @@ SimulationOptions read_simulation_file(const std::filesystem::path& path) {
   o.machine.joint_sigma_mm = machine.number("joint_sigma_mm");
   o.machine.leg_offset_sigma_mm = machine.number("leg_offset_sigma_mm");
   o.machine.leg_scale_sigma = machine.number("leg_scale_sigma");
+  o.machine.draws = static_cast<int>(machine.number_or("draws", 1));  // older files: one
   o.machine.stroke_wave_mm = machine.number("stroke_wave_mm");
   o.machine.backlash_mm = machine.number("backlash_mm");
   o.machine.leg_compliance_mm_per_n = machine.number("leg_compliance_mm_per_n");
