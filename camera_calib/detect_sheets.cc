@@ -21,21 +21,6 @@ namespace {
 
 constexpr double kFrameMarginPx = 3;
 
-FeatureObservation from_marker(const MarkerObservation& marker, int sheet, int first_point) {
-  FeatureObservation feature;
-  feature.sheet = sheet;
-  feature.first_point = first_point;
-  feature.status = marker.status;
-  feature.px.resize(8);
-  for (Eigen::Index i = 0; i < 4; ++i) {
-    feature.px.segment<2>(2 * i) = marker.corners_px[static_cast<std::size_t>(i)];
-  }
-  feature.covariance_px2 = marker.covariance_px2;
-  feature.blur_px = marker.blur_px;
-  feature.chi2_per_dof = marker.chi2_per_dof;
-  return feature;
-}
-
 FeatureObservation from_point(const PointObservation& point, int sheet, int first_point) {
   FeatureObservation feature;
   feature.sheet = sheet;
@@ -205,7 +190,7 @@ void detect_family(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>
     if (place == places.end()) {
       if (marker.status == MarkerStatus::ok) out.foreign_ids.push_back(marker.id);
     } else {
-      out.features.push_back(from_marker(marker, place->second.first, place->second.second));
+      out.features.push_back(feature_of_marker(marker, place->second.first, place->second.second));
     }
   }
 }
@@ -245,6 +230,21 @@ void prefer_saddles(const std::vector<Sheet>& sheets, std::vector<FeatureObserva
 }
 
 }  // namespace
+
+FeatureObservation feature_of_marker(const MarkerObservation& marker, int sheet, int first_point) {
+  FeatureObservation feature;
+  feature.sheet = sheet;
+  feature.first_point = first_point;
+  feature.status = marker.status;
+  feature.px.resize(8);
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    feature.px.segment<2>(2 * i) = marker.corners_px[static_cast<std::size_t>(i)];
+  }
+  feature.covariance_px2 = marker.covariance_px2;
+  feature.blur_px = marker.blur_px;
+  feature.chi2_per_dof = marker.chi2_per_dof;
+  return feature;
+}
 
 SheetDetection detect_sheets(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>& sheets) {
   SheetDetection out;
@@ -288,7 +288,7 @@ std::vector<FeatureObservation> refine_sheets(const cv::Mat& grey, ToneCurve ton
       }
       const auto& pattern = marker_family(sheet.family).patterns[static_cast<std::size_t>(markers[m].id)];
       const MarkerObservation marker = refine_marker(grey, tone, pattern, corners, {}, &camera);
-      measured[m] = from_marker(marker, view.sheet, 4 * static_cast<int>(m));
+      measured[m] = feature_of_marker(marker, view.sheet, 4 * static_cast<int>(m));
     });
     for (auto& feature : measured) {
       if (feature) out.push_back(std::move(*feature));

@@ -10,6 +10,10 @@
 
 namespace hexcal {
 
+/// Corners of a marker as a feature.
+[[nodiscard]] FeatureObservation feature_of_marker(const MarkerObservation& marker, int sheet,
+                                                   int first_point);
+
 struct SheetDetection {
   std::vector<FeatureObservation>
       features;                  ///< ordered by sheet and point; with a status other than ok if unusable

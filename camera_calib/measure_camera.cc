@@ -4,18 +4,22 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <map>
 
 #include "camera_calib/detect_sheets.h"
+#include "camera_calib/remeasure_markers.h"
+#include "camera_calib/robust_fit.h"
 
 namespace hexcal {
 namespace {
 
 namespace fs = std::filesystem;
 
-// Pixels kept in memory between the two measurements; beyond, photographs are read twice.
+// Pixels kept in memory between the measurements; beyond, photographs are read again.
 constexpr std::size_t kKeptBytes = std::size_t{1} << 31;
+constexpr double kLeastRoughSigmaPx = 0.02;  // what a rough camera leaves unexplained at least
 
 // Photographs kept in memory; those that do not fit are read again.
 class Pixels {
@@ -26,8 +30,8 @@ class Pixels {
     const std::size_t bytes = photograph.grey.total() * photograph.grey.elemSize();
     if (bytes * paths_.size() <= kKeptBytes) kept_[i] = std::move(photograph);
   }
-  [[nodiscard]] Photograph get(std::size_t i) {
-    return kept_[i].grey.empty() ? read_photograph(paths_[i]) : std::move(kept_[i]);
+  [[nodiscard]] Photograph get(std::size_t i) const {
+    return kept_[i].grey.empty() ? read_photograph(paths_[i]) : kept_[i];
   }
 
  private:
@@ -102,6 +106,33 @@ void leave_out_other_settings(std::vector<SheetPhotograph>& photographs) {
   }
 }
 
+// The photometric model holds the lens, so that a lens that was known only roughly bends corners where
+// markers are large in the frame: with a camera from all corners, those that it moves are measured again.
+void remeasure(const std::vector<Sheet>& sheets, const Pixels& pixels, CalibrationState state,
+               double sigma_px, std::vector<SheetPhotograph>& photographs) {
+  constexpr int kRounds = 2;
+  const CameraVariant variant{LensModel::radial, all_but_affinity(LensModel::radial), BoardFreedom::warped};
+  for (int round = 0; round < kRounds; ++round) {
+    const CameraModel before = state.camera;
+    const RobustFitResult fit = robust_fit(sheets, with_features(state, photographs), variant, sigma_px,
+                                           {.rounds = 2, .with_covariance = false});
+    if (!fit.adjustment.converged) return;
+    state = fit.adjustment.state;
+    sigma_px = std::max(fit.extra_sigma_px, kLeastRoughSigmaPx);
+    std::atomic<std::size_t> count = 0;
+    tbb::parallel_for(std::size_t{0}, photographs.size(), [&](std::size_t i) {
+      const std::vector<std::size_t> which =
+          markers_bent_otherwise(photographs[i].features, before, state.camera);
+      if (which.empty()) return;
+      const Photograph photograph = pixels.get(i);
+      remeasure_markers(photograph.grey, photograph.tone, sheets, state.camera, which,
+                        photographs[i].features);
+      count += which.size();
+    });
+    if (count == 0) return;
+  }
+}
+
 LensSetting common_setting(const std::vector<SheetPhotograph>& photographs,
                            const CameraCalibration& calibration) {
   for (const SheetView& view : calibration.fit.adjustment.state.views) {
@@ -140,8 +171,9 @@ MeasuredCamera measure_camera(const std::vector<fs::path>& paths, const std::vec
     }
     if (on_photograph) on_photograph();
   });
-  out.calibration = calibrate_camera(sheets, with_features(rough, out.photographs),
-                                     std::max(out.calibration.fit.extra_sigma_px, 0.02), options);
+  const double sigma_px = std::max(out.calibration.fit.extra_sigma_px, kLeastRoughSigmaPx);
+  remeasure(sheets, pixels, rough, sigma_px, out.photographs);
+  out.calibration = calibrate_camera(sheets, with_features(rough, out.photographs), sigma_px, options);
   out.setting = common_setting(out.photographs, out.calibration);
   return out;
 }

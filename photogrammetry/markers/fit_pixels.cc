@@ -109,12 +109,40 @@ FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, 
     hull = grown;
   }
 
+  // Most of a large marker is far from any transition: whole tiles of 8 x 8 pixels are passed over when the
+  // pattern does not change within the reach of any of their pixels.
+  constexpr int kTile = 8;
+  constexpr double kTileReach = 1.1 * kTile;  // half its diagonal, 5.7 px, and perspective within it
+  const int tiles_across = box.width / kTile + 1;
+  std::vector<char> wanted(static_cast<std::size_t>(tiles_across));
+  const auto look_at_tiles = [&](int top) {
+    const PixelMapPatch::Row row = patch.row(top + 0.5 * (kTile - 1));
+    for (int tile = 0; tile < tiles_across; ++tile) {
+      const PixelMapPatch::Point ideal = row.at(box.x + (tile + 0.5) * kTile - 0.5);
+      const SquarePoint square =
+          square_point(selection.homography, (ideal.ideal - frame.middle) * px_to_plane);
+      const Eigen::Matrix2d by_px = square.by_point * ideal.by_px * (px_to_plane * half_square);
+      const Eigen::Vector2d u = square.t * half_square + Eigen::Vector2d::Constant(half_pattern);
+      const double reach = selection.reach_px + kTileReach;
+      wanted[static_cast<std::size_t>(tile)] =
+          !(square.scale > 0) || request.pattern.has_transition(u.x(), u.y(), reach * by_px.row(0).norm(),
+                                                                reach * by_px.row(1).norm());
+    }
+  };
   const auto visit = [&](auto&& use) {
     for (int y = box.y; y < box.y + box.height; ++y) {
+      if ((y - box.y) % kTile == 0) look_at_tiles(y);
       const Span span = span_in_row(hull, y, box);
       if (span.first > span.last) continue;
       const PixelMapPatch::Row row = patch.row(y);
-      for (int x = span.first; x <= span.last; ++x) use(x, y, row);
+      for (int x = span.first; x <= span.last; ++x) {
+        const int tile = (x - box.x) / kTile;
+        if (wanted[static_cast<std::size_t>(tile)] == 0) {
+          x = box.x + (tile + 1) * kTile - 1;
+          continue;
+        }
+        use(x, y, row);
+      }
     }
   };
 
