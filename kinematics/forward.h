@@ -17,8 +17,8 @@ enum class ForwardStatus {
 [[nodiscard]] const char* name(ForwardStatus status);
 
 struct ForwardOptions {
-  double tolerance_mm = 1e-12;  ///< stop when the next correction would be smaller; never below rounding
-  int max_iterations = 50;      ///< Newton steps in one solve
+  double tolerance_mm = 1e-13;  ///< stop when the next correction would be smaller; never below rounding
+  int max_iterations = 50;      ///< Jacobians taken in one solve
   double smallest_step = 1e-4;  ///< of the way from home, below which the continuation gives up
   bool enforce_limits = false;  ///< report left_workspace where strokes or joint limits are broken
 
@@ -30,7 +30,7 @@ struct ForwardResult {
   ForwardStatus status = ForwardStatus::failed;
   std::optional<Rigid3> B_from_P;
   std::string reason;  ///< empty when converged
-  int iterations = 0;  ///< Newton steps in all
+  int iterations = 0;  ///< Jacobians taken in all
   int continuation_steps = 0;
   double residual_mm = 0;  ///< largest leg residual at B_from_P
 };

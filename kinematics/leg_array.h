@@ -10,6 +10,7 @@ namespace hexcal {
 struct LegArray {
   using Lanes = Eigen::Array<double, 6, 1>;
 
+  LegArray() = default;
   explicit LegArray(const PlatformGeometry& geometry);
 
   Lanes ax, ay, az;  ///< base joints in B, mm

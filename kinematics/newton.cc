@@ -1,138 +1,213 @@
 #include "kinematics/newton.h"
 
+#include <array>
 #include <cmath>
 #include <limits>
-#include <utility>
 
+#include "kinematics/leg_elimination.h"
 #include "kinematics/screw.h"
 
 namespace hexcal {
 namespace {
 
-// Six equations in rows of eight: six coefficients, the right side and one unused lane, so that a row is four
-// 16-byte registers.
-struct Equations {
-  alignas(16) double row[6][8];
+using Lanes = LegArray::Lanes;
+
+// A pose as Newton's method moves it. The quaternion is not kept at unit length, only how to make it one.
+class MovingPose {
+ public:
+  explicit MovingPose(const Rigid3& start)
+      : w_(start.rotation.w()),
+        x_(start.rotation.x()),
+        y_(start.rotation.y()),
+        z_(start.rotation.z()),
+        scale_(2 / start.rotation.squaredNorm()),
+        t_(start.translation) {}
+
+  [[nodiscard]] Eigen::Matrix3d rotation() const {
+    const double x2 = scale_ * x_;
+    const double y2 = scale_ * y_;
+    const double z2 = scale_ * z_;
+    const double wx = w_ * x2;
+    const double wy = w_ * y2;
+    const double wz = w_ * z2;
+    const double xx = x_ * x2;
+    const double xy = x_ * y2;
+    const double xz = x_ * z2;
+    const double yy = y_ * y2;
+    const double yz = y_ * z2;
+    const double zz = z_ * z2;
+    Eigen::Matrix3d r;
+    r << 1 - (yy + zz), xy - wz, xz + wy, xy + wz, 1 - (xx + zz), yz - wx, xz - wy, yz + wx, 1 - (xx + yy);
+    return r;
+  }
+  [[nodiscard]] const Eigen::Vector3d& translation() const { return t_; }
+  [[nodiscard]] Rigid3 rigid() const { return {Eigen::Quaterniond(w_, x_, y_, z_), t_}; }
+
+  // The Cayley form of exp(dr): equal to it to second order, which Newton's method cannot tell, and without
+  // sines. The quaternion (1, dr / 2) lengthens the product by a known factor, so that no norm is taken.
+  void move(const Vector6d& delta) {
+    t_ += delta.head<3>();
+    const double x = 0.5 * delta[3];
+    const double y = 0.5 * delta[4];
+    const double z = 0.5 * delta[5];
+    const double w0 = w_;
+    const double x0 = x_;
+    const double y0 = y_;
+    const double z0 = z_;
+    scale_ /= 1 + (x * x + y * y + z * z);
+    w_ = w0 - x * x0 - y * y0 - z * z0;
+    x_ = (x0 + x * w0) + (y * z0 - z * y0);
+    y_ = (y0 + y * w0) + (z * x0 - x * z0);
+    z_ = (z0 + z * w0) + (x * y0 - y * x0);
+  }
+
+ private:
+  double w_, x_, y_, z_;
+  double scale_;  // 2 / squared length of the quaternion
+  Eigen::Vector3d t_;
 };
 
-// Gaussian elimination with row pivoting; the solution is left in x and the determinant returned. A zero
-// pivot stands for a singular matrix: x is then not finite.
-double solve(Equations& e, double (&x)[6]) {
-  double determinant = 1;
-  double over_pivot[6];
-  int order[6] = {0, 1, 2, 3, 4, 5};
-  for (int k = 0; k < 6; ++k) {
-    int best = k;
-    double largest = std::abs(e.row[order[k]][k]);
-    for (int r = k + 1; r < 6; ++r) {
-      const double size = std::abs(e.row[order[r]][k]);
-      if (size > largest) {
-        largest = size;
-        best = r;
-      }
-    }
-    if (best != k) {
-      std::swap(order[k], order[best]);
-      determinant = -determinant;
-    }
-    const double* pivot = e.row[order[k]];
-    determinant *= pivot[k];
-    over_pivot[k] = 1 / pivot[k];
-    const int first = (k + 1) & ~1;  // whole registers
-    for (int r = k + 1; r < 6; ++r) {
-      double* row = e.row[order[r]];
-      const double factor = row[k] * over_pivot[k];
-      for (int c = first; c < 8; ++c) row[c] -= factor * pivot[c];
-    }
-  }
-  for (int k = 5; k >= 0; --k) {
-    const double* row = e.row[order[k]];
-    double sum = row[6];
-    for (int c = k + 1; c < 6; ++c) sum -= row[c] * x[c];
-    x[k] = sum * over_pivot[k];
-  }
-  return determinant;
-}
+// The equations (length^2 - |R b + t - a|^2) / 2 = 0: their roots are those of length - |R b + t - a|, their
+// gradients leg_jacobian's rows times the lengths, and they need neither roots nor quotients.
+class SquaredLegs {
+ public:
+  SquaredLegs(const LegArray& legs, const LegVector& lengths_mm)
+      : legs_(&legs), length_(lengths_mm.array()) {}
 
-struct Motion {
-  double w, x, y, z;  // unit quaternion
-  Eigen::Vector3d t;
+  [[nodiscard]] Lanes residual(const MovingPose& pose) const {
+    const Arms arm = arms(pose.rotation());
+    const Eigen::Vector3d& t = pose.translation();
+    return residual(arm.x + (t.x() - legs_->ax), arm.y + (t.y() - legs_->ay), arm.z + (t.z() - legs_->az));
+  }
+  [[nodiscard]] Lanes linearise(const MovingPose& pose, std::array<Lanes, 6>& columns) const {
+    const Arms arm = arms(pose.rotation());
+    const Eigen::Vector3d& t = pose.translation();
+    columns[0] = arm.x + (t.x() - legs_->ax);
+    columns[1] = arm.y + (t.y() - legs_->ay);
+    columns[2] = arm.z + (t.z() - legs_->az);
+    columns[3] = arm.y * columns[2] - arm.z * columns[1];
+    columns[4] = arm.z * columns[0] - arm.x * columns[2];
+    columns[5] = arm.x * columns[1] - arm.y * columns[0];
+    return residual(columns[0], columns[1], columns[2]);
+  }
+  [[nodiscard]] double largest_mm(const Lanes& residual) const {
+    return (residual / length_).abs().maxCoeff();
+  }
+  void reorder(const LegOrder& order) {
+    const auto put_in_order = [&order](Lanes& lanes) { lanes = in_order(lanes, order); };
+    reordered_ = *legs_;
+    for (Lanes* lanes : {&reordered_.ax, &reordered_.ay, &reordered_.az, &reordered_.bx, &reordered_.by,
+                         &reordered_.bz, &length_})
+      put_in_order(*lanes);
+    legs_ = &reordered_;
+  }
+
+ private:
+  struct Arms {
+    Lanes x, y, z;  // R b
+  };
+  [[nodiscard]] Arms arms(const Eigen::Matrix3d& r) const {
+    const LegArray& l = *legs_;
+    return {r(0, 0) * l.bx + r(0, 1) * l.by + r(0, 2) * l.bz,
+            r(1, 0) * l.bx + r(1, 1) * l.by + r(1, 2) * l.bz,
+            r(2, 0) * l.bx + r(2, 1) * l.by + r(2, 2) * l.bz};
+  }
+  [[nodiscard]] Lanes residual(const Lanes& dx, const Lanes& dy, const Lanes& dz) const {
+    // The difference of squares keeps the digits where legs stand steep.
+    return 0.5 * ((length_ - dz) * (length_ + dz) - (dx * dx + dy * dy));
+  }
+
+  const LegArray* legs_;
+  Lanes length_;
+  LegArray reordered_;
 };
 
-Eigen::Matrix3d matrix(const Motion& m) {
-  Eigen::Matrix3d r;
-  const double x2 = m.x + m.x;
-  const double y2 = m.y + m.y;
-  const double z2 = m.z + m.z;
-  const double wx = m.w * x2;
-  const double wy = m.w * y2;
-  const double wz = m.w * z2;
-  const double xx = m.x * x2;
-  const double xy = m.x * y2;
-  const double xz = m.x * z2;
-  const double yy = m.y * y2;
-  const double yz = m.y * z2;
-  const double zz = m.z * z2;
-  r << 1 - (yy + zz), xy - wz, xz + wy, xy + wz, 1 - (xx + zz), yz - wx, xz - wy, yz + wx, 1 - (xx + yy);
-  return r;
-}
+// The equations length - actuated length = 0.
+class ScrewLegs {
+ public:
+  ScrewLegs(const PlatformGeometry& geometry, const LegVector& lengths_mm)
+      : geometry_(geometry), length_(lengths_mm.array()) {}
 
-// The Cayley form of exp(dr): equal to it to second order, which Newton's method cannot tell, and without
-// sines.
-void update(Motion& m, const double (&delta)[6]) {
-  m.t += Eigen::Vector3d(delta[0], delta[1], delta[2]);
-  const double x = 0.5 * delta[3];
-  const double y = 0.5 * delta[4];
-  const double z = 0.5 * delta[5];
-  const Motion q = m;
-  m.w = q.w - x * q.x - y * q.y - z * q.z;
-  m.x = q.x + x * q.w + y * q.z - z * q.y;
-  m.y = q.y + y * q.w + z * q.x - x * q.z;
-  m.z = q.z + z * q.w + x * q.y - y * q.x;
-  const double over = 1 / std::sqrt(m.w * m.w + m.x * m.x + m.y * m.y + m.z * m.z);
-  m.w *= over;
-  m.x *= over;
-  m.y *= over;
-  m.z *= over;
-}
+  [[nodiscard]] Lanes residual(const MovingPose& pose) const {
+    return in_order(length_ - actuated_lengths(geometry_, pose.rigid()).array(), order_);
+  }
+  [[nodiscard]] Lanes linearise(const MovingPose& pose, std::array<Lanes, 6>& columns) const {
+    const Matrix6d j = actuated_jacobian(geometry_, pose.rigid());
+    for (std::size_t k = 0; k < 6; ++k)
+      columns[k] = in_order(j.col(static_cast<Eigen::Index>(k)).array(), order_);
+    return residual(pose);
+  }
+  [[nodiscard]] static double largest_mm(const Lanes& residual) { return residual.abs().maxCoeff(); }
+  void reorder(const LegOrder& order) {
+    const LegOrder before = order_;
+    for (std::size_t lane = 0; lane < 6; ++lane) order_[lane] = before[static_cast<std::size_t>(order[lane])];
+  }
 
-// `evaluate(rotation, translation, equations)` fills the Jacobian and, on the right side, wanted minus actual
-// length; it returns the largest residual.
-template <class Evaluate>
-NewtonResult iterate(const Evaluate& evaluate, double squared_unit_mm2, double rounding_mm,
-                     const Rigid3& start, const NewtonOptions& options) {
+ private:
+  const PlatformGeometry& geometry_;
+  Lanes length_;
+  LegOrder order_{0, 1, 2, 3, 4, 5};
+};
+
+// Newton's method in which each matrix serves several corrections: the one at its own pose (ordinary) and
+// then, while they shrink quickly, those at the poses reached (simplified). Two corrections by one matrix
+// converge with order three (Potra & Ptak 1984) and cost little more than one.
+template <class Legs>
+NewtonResult iterate(Legs legs, double squared_unit_mm2, double rounding_mm, const Rigid3& start,
+                     const NewtonOptions& options) {
+  // A correction that shrinks less than this is no longer simplified, and at the level of rounding the last.
+  constexpr double kSlow2 = 0.25 * 0.25;
+  const double tolerance2 = options.tolerance_mm * options.tolerance_mm;
+  const double largest2 = options.largest_contraction * options.largest_contraction;
   NewtonResult result;
-  Motion at{start.rotation.w(), start.rotation.x(), start.rotation.y(), start.rotation.z(),
-            start.translation};
-  double last_mm = 0;
-  for (int i = 0; i < options.max_iterations && !result.converged; ++i) {
-    Equations equations;
-    double delta[6];
-    result.residual_mm = evaluate(matrix(at), at.t, equations);
-    result.determinant = solve(equations, delta);
-    result.iterations = i + 1;
-    const double turn2 = delta[3] * delta[3] + delta[4] * delta[4] + delta[5] * delta[5];
-    const double step_mm =
-        std::sqrt(delta[0] * delta[0] + delta[1] * delta[1] + delta[2] * delta[2] + turn2 * squared_unit_mm2);
-    if (!(step_mm <= std::numeric_limits<double>::max())) {
-      result.singular = true;
-      return result;
+  MovingPose at(start);
+  LegElimination matrix;
+  double last2 = std::numeric_limits<double>::infinity();  // squared size of the last correction
+  int corrections = 0;
+  bool odd_order = false;
+  while (result.iterations < options.max_iterations && !result.converged) {
+    std::array<Lanes, 6> columns;
+    Lanes residual = legs.linearise(at, columns);
+    if (!matrix.factor(columns)) {
+      const LegOrder order = LegElimination::spanning_order(columns);
+      legs.reorder(order);
+      odd_order ^= is_odd(order);
+      residual = legs.linearise(at, columns);
+      (void)matrix.factor(columns);
     }
-    const double contraction = i == 0 ? 0 : step_mm / last_mm;
-    if (i == 1) result.first_contraction = contraction;
-    if (i > 0 && contraction > 0.5 && result.residual_mm <= rounding_mm) {
-      result.converged = true;  // rounding is all that is left
-      break;
+    ++result.iterations;
+    for (bool ordinary = true;; ordinary = false) {
+      const Vector6d delta = matrix.solve(residual);
+      const double step2 = delta.head<3>().squaredNorm() + squared_unit_mm2 * delta.tail<3>().squaredNorm();
+      if (!(step2 <= std::numeric_limits<double>::max())) {
+        result.singular = true;
+        return result;
+      }
+      const double contraction2 = step2 / last2;
+      if (++corrections == 2) result.first_contraction = std::sqrt(contraction2);
+      if (contraction2 > kSlow2 && legs.largest_mm(residual) <= rounding_mm) {
+        result.converged = true;
+        break;
+      }
+      if (contraction2 > largest2) return result;
+      if (!ordinary && contraction2 > kSlow2) break;
+      at.move(delta);
+      last2 = step2;
+      if (step2 <= tolerance2) {
+        result.converged = true;
+        break;
+      }
+      if (!ordinary) {
+        // The rate of simplified corrections is at most about twice the first contraction.
+        const double rate2 = 4 * contraction2;
+        result.converged = rate2 * step2 <= tolerance2;
+        if (result.converged || rate2 * rate2 * step2 > tolerance2) break;
+      }
+      residual = legs.residual(at);
     }
-    if (contraction > options.largest_contraction) return result;
-    update(at, delta);
-    last_mm = step_mm;
-    // Convergence is quadratic: the next step would be about contraction^2 times this one.
-    const double next_mm = i == 0 ? step_mm : contraction * contraction * step_mm;
-    result.converged = next_mm <= options.tolerance_mm || step_mm <= options.tolerance_mm;
   }
-  result.B_from_P.rotation = Eigen::Quaterniond(at.w, at.x, at.y, at.z);
-  result.B_from_P.translation = at.t;
+  result.determinant = odd_order ? -matrix.determinant() : matrix.determinant();
+  result.B_from_P = at.rigid();
   return result;
 }
 
@@ -147,41 +222,16 @@ double rounding_level_mm(const LegVector& lengths_mm, const Rigid3& start) {
 NewtonResult newton(const LegArray& legs, const LegVector& lengths_mm, const Rigid3& start,
                     const NewtonOptions& options) {
   const double squared_unit_mm2 = (legs.bx * legs.bx + legs.by * legs.by + legs.bz * legs.bz).sum() / 6;
-  const auto evaluate = [&](const Eigen::Matrix3d& r, const Eigen::Vector3d& t, Equations& e) {
-    const LegLanes lanes = leg_lanes(legs, r, t);
-    const LegArray::Lanes residual = lengths_mm.array() - lanes.length;
-    for (int i = 0; i < 6; ++i) {
-      double* row = e.row[i];
-      row[0] = lanes.ux[i];
-      row[1] = lanes.uy[i];
-      row[2] = lanes.uz[i];
-      row[3] = lanes.mx[i];
-      row[4] = lanes.my[i];
-      row[5] = lanes.mz[i];
-      row[6] = residual[i];
-      row[7] = 0;
-    }
-    return residual.abs().maxCoeff();
-  };
-  return iterate(evaluate, squared_unit_mm2, rounding_level_mm(lengths_mm, start), start, options);
+  return iterate(SquaredLegs(legs, lengths_mm), squared_unit_mm2, rounding_level_mm(lengths_mm, start), start,
+                 options);
 }
 
 NewtonResult newton_with_screws(const PlatformGeometry& geometry, const LegVector& lengths_mm,
                                 const Rigid3& start, const NewtonOptions& options) {
   double squared_unit_mm2 = 0;
   for (const Eigen::Vector3d& b : geometry.platform_joints_mm) squared_unit_mm2 += b.squaredNorm() / 6;
-  const auto evaluate = [&](const Eigen::Matrix3d& r, const Eigen::Vector3d& t, Equations& e) {
-    const Rigid3 pose(r, t);
-    const LegVector residual = lengths_mm - actuated_lengths(geometry, pose);
-    const Matrix6d j = actuated_jacobian(geometry, pose);
-    for (int i = 0; i < 6; ++i) {
-      for (int k = 0; k < 6; ++k) e.row[i][k] = j(i, k);
-      e.row[i][6] = residual[i];
-      e.row[i][7] = 0;
-    }
-    return residual.cwiseAbs().maxCoeff();
-  };
-  return iterate(evaluate, squared_unit_mm2, rounding_level_mm(lengths_mm, start), start, options);
+  return iterate(ScrewLegs(geometry, lengths_mm), squared_unit_mm2, rounding_level_mm(lengths_mm, start),
+                 start, options);
 }
 
 }  // namespace hexcal

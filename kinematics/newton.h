@@ -5,23 +5,23 @@
 namespace hexcal {
 
 struct NewtonOptions {
-  double tolerance_mm = 1e-12;  ///< of the next correction; rounding sets the floor
-  int max_iterations = 50;
+  double tolerance_mm = 1e-13;       ///< of the next correction; rounding sets the floor
+  int max_iterations = 50;           ///< Jacobians taken
   double largest_contraction = 1e3;  ///< gives up once a step is longer than this times the one before it
 };
 
 struct NewtonResult {
   bool converged = false;
-  bool singular = false;  ///< met an exactly singular Jacobian
-  int iterations = 0;
-  double first_contraction = 0;  ///< second step over first step: Deuflhard's estimate of the nonlinearity
-  double determinant = 0;        ///< of leg_jacobian one step before the end
-  double residual_mm = 0;        ///< largest leg residual one step before the end
+  bool singular = false;         ///< met an exactly singular Jacobian
+  int iterations = 0;            ///< Jacobians taken
+  double first_contraction = 0;  ///< simplified correction over the first: how nonlinear the way was
+  double determinant = 0;        ///< of the last Jacobian, rows in any positive unit: its sign is what counts
   Rigid3 B_from_P;
 };
 
-/// Newton's method for leg_lengths(pose) = lengths_mm with multiplicative updates. Steps are measured in mm,
-/// with rotations weighed by the platform's size. Allocates nothing.
+/// Newton's method for leg_lengths(pose) = lengths_mm with multiplicative updates and, for each Jacobian, one
+/// or two simplified corrections (Deuflhard 2004, sec. 2.1; order three: Potra & Ptak 1984). Corrections are
+/// measured in mm, with rotations weighed by the platform's size. Allocates nothing.
 [[nodiscard]] NewtonResult newton(const LegArray& legs, const LegVector& lengths_mm, const Rigid3& start,
                                   const NewtonOptions& options = {});
 
