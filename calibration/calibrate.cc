@@ -128,12 +128,7 @@ CalibrationReport calibrate(const PlatformGeometry& nominal, const ObservationSe
   const ObservationSet used = out.empty() ? observations : observations.subset(kept);
 
   // With frames that the measurement does not share with the hexapod, errors exist only after alignment.
-  ObservationSet seen = used;
-  if (frames_unknown) {
-    const IdentifyResult aligned = identify(nominal, used, options.identify);
-    if (aligned.status != IdentifyStatus::identified) throw InputError(aligned.reason);
-    seen = in_hexapod_frames(nominal, used, aligned);
-  }
+  const ObservationSet seen = frames_unknown ? in_hexapod_frames(nominal, used) : used;
   std::vector<PosePair> pairs;
   const ObservationSet& listed = frames_unknown ? seen : observations;
   for (const PoseObservation& pose : listed.poses) {
@@ -148,6 +143,7 @@ CalibrationReport calibrate(const PlatformGeometry& nominal, const ObservationSe
 
   const std::vector<Candidate> candidates = candidates_for(used, options.identify);
   report.comparison = compare_methods(nominal, used, candidates, options.comparison);
+  for (const std::size_t i : report.comparison.unexplained) report.unexplained.push_back(used.poses[i].id);
   if (!pairs.empty())
     report.evaluations = evaluate_methods(used, report.comparison, candidates, nominal, seen);
 

@@ -32,6 +32,7 @@ struct PaperEvaluation {
 
 struct CalibrationReport {
   std::vector<std::string> outliers;             ///< the paper's near-singular rule: out for all methods
+  std::vector<std::string> unexplained;          ///< poses that fit no method: out of the comparison
   std::vector<std::string> pose_ids;             ///< poses with a target, outliers included
   std::vector<Vector6d> errors;                  ///< measured minus target: figure 9
   std::optional<ErrorStatistics> uncompensated;  ///< without outliers: figure 10; nothing without targets

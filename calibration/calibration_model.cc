@@ -48,7 +48,8 @@ std::optional<LegVector> readings_for_pose(const CalibrationModel& model, const 
   return readings;
 }
 
-std::optional<Pose> pose_for_readings(const CalibrationModel& model, const LegVector& readings) {
+std::optional<Pose> pose_for_readings(const CalibrationModel& model, const LegVector& readings,
+                                      const LegVector& approach) {
   const bool kinematic = model.method == CompensationMethod::kinematic;
   const MachineModel machine = kinematic ? model.machine : MachineModel{.geometry = model.nominal};
   // The feasible pose of the bare geometry is the start of the one with all terms. It is searched from home,
@@ -57,7 +58,8 @@ std::optional<Pose> pose_for_readings(const CalibrationModel& model, const LegVe
   const PlatformGeometry own = kinematic ? machine_in_hexapod_frames(model).geometry : model.nominal;
   const ForwardResult feasible = forward_kinematics(own, lengths_from_readings(own, readings));
   if (feasible.status != ForwardStatus::converged) return std::nullopt;
-  const auto pose = machine_pose(machine, readings, machine.geometry.pose_from_B_from_P(*feasible.B_from_P));
+  const auto pose =
+      machine_pose(machine, readings, machine.geometry.pose_from_B_from_P(*feasible.B_from_P), approach);
   if (!pose || kinematic || model.method == CompensationMethod::nominal) return pose;
   return target_of_command(model.nominal, model.paper, *pose);
 }

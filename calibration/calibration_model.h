@@ -27,8 +27,10 @@ struct CalibrationModel {
 /// Readings at which the machine stands at a pose given as it was measured; nothing where there are none.
 [[nodiscard]] std::optional<LegVector> readings_for_pose(const CalibrationModel& model, const Pose& pose);
 
-/// Pose, as it would be measured, of the machine at readings; nothing where none is found.
-[[nodiscard]] std::optional<Pose> pose_for_readings(const CalibrationModel& model, const LegVector& readings);
+/// Pose, as it would be measured, of the machine at readings; nothing where none is found. `approach`: +1, -1
+/// or 0 per leg, the direction of its last movement (of machines with backlash).
+[[nodiscard]] std::optional<Pose> pose_for_readings(const CalibrationModel& model, const LegVector& readings,
+                                                    const LegVector& approach = LegVector::Zero());
 
 /// The identified machine seen in the hexapod's own frames, in which targets are given. Differs from
 /// model.machine only where the measurement's frames were unknown.

@@ -4,6 +4,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -111,59 +112,69 @@ std::string advise(const PlatformGeometry& nominal, const IdentifyResult& identi
       best_words.find("moved") == 0 ? "mm" : "deg", best - determined);
 }
 
+// One kind of number of one leg: what it is off by, in words and as a displacement of the leg.
+struct LegPart {
+  std::string words;
+  double value = 0;
+  double sigma = 0;
+  double effect_mm = 0;
+  bool significant() const { return sigma > 0 && std::abs(value) > 4 * sigma; }
+};
+
+// Scale, offset, base joint, platform joint.
+std::array<LegPart, 4> leg_parts(const IdentifyResult& identified, int leg) {
+  const int at = ParameterLayout::kPerLeg * leg;
+  const auto sigma_of = [&](int parameter) {
+    const int free = identified.selection.free_of[static_cast<std::size_t>(parameter)];
+    return free < 0 ? 0.0 : std::sqrt(identified.covariance(free, free));
+  };
+  const auto joint = [&](const char* name, int first) {
+    const double off = identified.corrections.segment<3>(first).norm();
+    const double sigma = std::hypot(sigma_of(first), sigma_of(first + 1), sigma_of(first + 2));
+    return LegPart{fmt::format("{} {:.3f} mm off +- {:.3f} mm", name, off, sigma), off, sigma, off};
+  };
+  const double scale = identified.corrections[at + 7];
+  const double offset = identified.corrections[at + 6];
+  const double half_stroke_mm =
+      0.5 * (identified.stroke_range(leg, 1) - identified.stroke_range(leg, 0)) *
+      identified.machine.geometry.actuators[static_cast<std::size_t>(leg)].mm_per_unit;
+  return {LegPart{fmt::format("scale {:+.2f} % +- {:.2f} %", 100 * scale, 100 * sigma_of(at + 7)), scale,
+                  sigma_of(at + 7), std::abs(scale * half_stroke_mm)},
+          LegPart{fmt::format("offset {:+.3f} mm +- {:.3f} mm", offset, sigma_of(at + 6)), offset,
+                  sigma_of(at + 6), std::abs(offset)},
+          joint("base joint", at), joint("platform joint", at + 3)};
+}
+
+// A number is wrong when it is significant and far larger than the same one of the other legs: all legs of a
+// machine as built are off by something.
 std::vector<LegDiagnosis> diagnose_legs(const IdentifyResult& identified) {
+  constexpr double kFarAboveOthers = 5;
+  std::array<std::array<LegPart, 4>, 6> parts;
+  for (std::size_t leg = 0; leg < 6; ++leg) parts[leg] = leg_parts(identified, static_cast<int>(leg));
   std::vector<LegDiagnosis> legs;
-  std::vector<double> effects;
-  for (int leg = 0; leg < 6; ++leg) {
+  for (std::size_t leg = 0; leg < 6; ++leg) {
     LegDiagnosis diagnosis;
-    diagnosis.leg = leg + 1;
-    const int at = ParameterLayout::kPerLeg * leg;
-    const auto sigma_of = [&](int parameter) {
-      const int free = identified.selection.free_of[static_cast<std::size_t>(parameter)];
-      return free < 0 ? 0.0 : std::sqrt(identified.covariance(free, free));
-    };
-    const double scale = identified.corrections[at + 7];
-    const double offset = identified.corrections[at + 6];
-    const auto leg_index = static_cast<std::size_t>(leg);
-    const double half_stroke_mm = 0.5 * (identified.stroke_range(leg, 1) - identified.stroke_range(leg, 0)) *
-                                  identified.machine.geometry.actuators[leg_index].mm_per_unit;
-    const double base = identified.corrections.segment<3>(at).norm();
-    const double platform = identified.corrections.segment<3>(at + 3).norm();
-    const auto joint_sigma = [&](int first) {
-      return std::sqrt(std::pow(sigma_of(first), 2) + std::pow(sigma_of(first + 1), 2) +
-                       std::pow(sigma_of(first + 2), 2));
-    };
-    struct Part {
-      std::string words;
-      double effect_mm;
-      double significance;
-    };
-    const auto ratio = [](double value, double sigma) { return sigma > 0 ? std::abs(value) / sigma : 0.0; };
-    std::vector<Part> parts{
-        {fmt::format("scale {:+.2f} % +- {:.2f} %", 100 * scale, 100 * sigma_of(at + 7)),
-         std::abs(scale * half_stroke_mm), ratio(scale, sigma_of(at + 7))},
-        {fmt::format("offset {:+.3f} mm +- {:.3f} mm", offset, sigma_of(at + 6)), std::abs(offset),
-         ratio(offset, sigma_of(at + 6))},
-        {fmt::format("base joint {:.3f} mm off +- {:.3f} mm", base, joint_sigma(at)), base,
-         ratio(base, joint_sigma(at))},
-        {fmt::format("platform joint {:.3f} mm off +- {:.3f} mm", platform, joint_sigma(at + 3)), platform,
-         ratio(platform, joint_sigma(at + 3))}};
-    std::stable_sort(parts.begin(), parts.end(),
-                     [](const Part& a, const Part& b) { return a.effect_mm > b.effect_mm; });
-    std::string words;
-    for (const Part& part : parts) {
-      if (part.significance < 4) continue;
+    diagnosis.leg = static_cast<int>(leg) + 1;
+    std::vector<std::pair<double, std::string>> words;  // largest effect first
+    for (std::size_t kind = 0; kind < parts[leg].size(); ++kind) {
+      const LegPart& part = parts[leg][kind];
+      if (!part.significant()) continue;
+      std::vector<double> others;
+      for (std::size_t other = 0; other < 6; ++other)
+        if (other != leg) others.push_back(std::abs(parts[other][kind].value));
+      std::nth_element(others.begin(), others.begin() + 2, others.end());
+      const bool wrong = std::abs(part.value) > kFarAboveOthers * others[2];
+      diagnosis.wrong = diagnosis.wrong || wrong;
       diagnosis.largest_effect_mm = std::max(diagnosis.largest_effect_mm, part.effect_mm);
-      words += (words.empty() ? "" : ", ") + part.words;
+      words.emplace_back(wrong ? -1e9 : -part.effect_mm, part.words);  // what is wrong stands first
     }
-    diagnosis.sentence = fmt::format("leg {}: {}", leg + 1, words.empty() ? "as nominal" : words);
-    effects.push_back(diagnosis.largest_effect_mm);
+    std::stable_sort(words.begin(), words.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::string joined;
+    for (const auto& [order, text] : words) joined += (joined.empty() ? "" : ", ") + text;
+    diagnosis.sentence = fmt::format("leg {}: {}", leg + 1, joined.empty() ? "as nominal" : joined);
     legs.push_back(diagnosis);
   }
-  std::vector<double> sorted = effects;
-  std::sort(sorted.begin(), sorted.end());
-  const double typical = 0.5 * (sorted[2] + sorted[3]);
-  for (LegDiagnosis& leg : legs) leg.wrong = leg.largest_effect_mm > 2 * typical && leg.largest_effect_mm > 0;
   return legs;
 }
 
@@ -183,14 +194,17 @@ Identifiability judge_identifiability(const PlatformGeometry& nominal, const Ide
                                  factor * std::sqrt(identified.covariance(j, j)),
                                  factor * identified.tolerances[j]});
   }
-  const Eigen::VectorXd length = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::VectorXd scale = scales(identified);
+  // Of a number that moves nothing that was measured only rounding is left, which must not be scaled up.
+  Eigen::VectorXd length = Eigen::VectorXd::Zero(n);
+  for (Eigen::Index j = 0; j < n; ++j)
+    if (information(j, j) * scale[j] * scale[j] > 1e-12) length[j] = 1.0 / std::sqrt(information(j, j));
   const Solver unit_columns(length.asDiagonal() * information * length.asDiagonal(), Eigen::EigenvaluesOnly);
   const Eigen::VectorXd squares = unit_columns.eigenvalues();
   const double smallest = kRankShare * kRankShare * squares.maxCoeff();
   judged.rank = static_cast<int>((squares.array() > smallest).count());
   if (judged.rank > 0) judged.condition = std::sqrt(squares.maxCoeff() / squares[n - judged.rank]);
 
-  const Eigen::VectorXd scale = scales(identified);
   const Solver by_tolerance(scale.asDiagonal() * information * scale.asDiagonal());
   for (Eigen::Index j = 0; j < n; ++j) {
     const double gain_squared = by_tolerance.eigenvalues()[j];

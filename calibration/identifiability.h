@@ -31,7 +31,7 @@ struct WeakDirection {
 struct LegDiagnosis {
   int leg = 0;  ///< 1 to 6
   double largest_effect_mm = 0;
-  bool wrong = false;    ///< significantly off, and more than the machine's other legs
+  bool wrong = false;    ///< a number is significantly off, and five times as far as the other legs' median
   std::string sentence;  ///< "leg 1: scale -6.0 % +- 0.1 %"
 };
 

@@ -21,6 +21,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kOutlierSquares = 22.46;
 constexpr double kMedianSquares = 5.348;
 constexpr int kMinPosesForRobust = 10;
+// How far frames may move in one step where nothing holds them: wider than any knowledge.
+constexpr double kFrameStepMm = 1000;
+constexpr double kFrameStepRad = 1;
 
 double tolerance_of(const Tolerances& t, const ParameterLayout& layout, int index) {
   switch (parameter_kind(layout, index)) {
@@ -90,7 +93,7 @@ class Identification {
  public:
   Identification(const PlatformGeometry& nominal, const ObservationSet& observations,
                  const IdentifyOptions& options)
-      : observations_(observations), options_(options) {
+      : drawing_(nominal), observations_(observations), options_(options) {
     nominal_.geometry = nominal;
     if (options.screw_lead && !nominal.screw)
       nominal_.geometry.screw = screw_with_tangential_axes(nominal, 0.0);
@@ -99,12 +102,15 @@ class Identification {
     result_.corrections.setZero(result_.layout.size());
     result_.weights.assign(observations.poses.size(), 1.0);
     result_.tolerances.setConstant(free_count(), kInfinity);
+    frame_steps_.setZero(free_count());
     kinds_.resize(static_cast<std::size_t>(free_count()));
     for (int i = 0; i < result_.layout.size(); ++i) {
       const int free = result_.selection.free_of[static_cast<std::size_t>(i)];
       if (free < 0) continue;
       result_.tolerances[free] = tolerance_of(options.tolerances, result_.layout, i);
       kinds_[static_cast<std::size_t>(free)] = parameter_kind(result_.layout, i);
+      frame_steps_[free] =
+          std::string_view(parameter_unit(result_.layout, i)) == "deg" ? kFrameStepRad : kFrameStepMm;
     }
     initial_tolerances_ = result_.tolerances;
     noise_.leg_sigma_mm = options.leg_sigma_mm;
@@ -195,7 +201,11 @@ class Identification {
   void fill_missing(std::size_t i) {
     const PoseObservation& pose = observations_.poses[i];
     if (pose.complete()) return;
-    const auto start = result_.iterations <= 1 && pose.target ? *pose.target : filled_[i];
+    // At first from the drawing's idea of where the platform stands, which knows no measuring frame.
+    const Pose start =
+        result_.iterations > 1
+            ? filled_[i]
+            : result_.machine.geometry.pose_from_B_from_P(drawing_.B_from_P(pose.target.value_or(Pose{})));
     const auto modelled = machine_pose(result_.machine, pose.readings, start, pose.approach);
     if (!modelled) return;
     Vector6d v = pose.measured.vector();
@@ -213,7 +223,11 @@ class Identification {
     Eigen::MatrixXd information = equations_.information;
     Eigen::VectorXd at = free_corrections();
     for (Eigen::Index j = 0; j < free_count(); ++j) {
-      if (!std::isfinite(result_.tolerances[j])) continue;
+      if (!std::isfinite(result_.tolerances[j])) {
+        // A frame that nothing determines (positions alone do not tell how the target is turned) stays.
+        information(j, j) += 1.0 / (frame_steps_[j] * frame_steps_[j]);
+        continue;
+      }
       const double weight = 1.0 / (result_.tolerances[j] * result_.tolerances[j]);
       information(j, j) += weight;
       prior_gradient[j] = weight * at[j];
@@ -221,11 +235,7 @@ class Identification {
     // Scaled to unit diagonal: millimetres, relative scales and radians differ by orders of magnitude.
     const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
     const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
-    Eigen::LDLT<Eigen::MatrixXd> ldlt(scaled);
-    const double smallest = ldlt.vectorD().minCoeff();
-    if (smallest <= 1e-14) {  // a frame that nothing determines: hold it by a trace of a prior
-      ldlt.compute(scaled + 1e-9 * Eigen::MatrixXd::Identity(free_count(), free_count()));
-    }
+    const Eigen::LDLT<Eigen::MatrixXd> ldlt(scaled);
     const Eigen::VectorXd delta =
         -(scale.asDiagonal() * ldlt.solve(scale.asDiagonal() * (equations_.gradient + prior_gradient)));
     if (!delta.allFinite()) {
@@ -316,10 +326,13 @@ class Identification {
       normed[i] = equations_.squares_of_pose[i] * 6.0 / static_cast<double>(reduced_[i].residuals.size());
     std::vector<double> sorted = normed;
     std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(n / 2), sorted.end());
-    const double limit = kOutlierSquares * std::max(1.0, sorted[n / 2] / kMedianSquares);
-    for (std::size_t i = 0; i < n; ++i)
-      result_.weights[i] =
-          observations_.poses[i].is_definition || normed[i] <= limit ? 1.0 : limit / normed[i];
+    // Where the noise is estimated, bad poses raise the estimate: the median alone tells the scale.
+    const double least = observations_.covariance_known ? 1.0 : 0.0;
+    const double limit = kOutlierSquares * std::max(least, sorted[n / 2] / kMedianSquares);
+    for (std::size_t i = 0; i < n; ++i) {
+      const double share = limit / normed[i];
+      result_.weights[i] = observations_.poses[i].is_definition || share >= 1 ? 1.0 : share * share;
+    }
   }
 
   void finish() {
@@ -358,13 +371,15 @@ class Identification {
     result_.orientation_sigma_rad = std::sqrt(orientation);
   }
 
+  const PlatformGeometry& drawing_;
   const ObservationSet& observations_;
   const IdentifyOptions& options_;
-  MachineModel nominal_;
+  MachineModel nominal_;  // the drawing in the frames of the measurement
   IdentifyResult result_;
   LegNoise noise_;
   std::vector<ParameterKind> kinds_;
   Eigen::VectorXd initial_tolerances_;
+  Eigen::VectorXd frame_steps_;
   std::vector<Pose> filled_;
   std::vector<ReducedPose> reduced_;
   NormalEquations equations_;

@@ -17,9 +17,9 @@ struct Candidate {
   int complexity = 0;        ///< how many numbers it has: the order of simplicity
 };
 
-/// The paper's options and the kinematic models that the data can bear, in order of complexity. Kinematic
-/// models: leg offsets only, with scales, with joints, with curves along the stroke, with sag, and with
-/// backlash where approach directions are known.
+/// The paper's options (where most poses are complete) and the kinematic models that the data can bear.
+/// Kinematic models: leg offsets only, with scales, with joints, with curves along the stroke, with sag, and
+/// with backlash where approach directions are known.
 [[nodiscard]] std::vector<Candidate> candidates_for(const ObservationSet& observations,
                                                     const IdentifyOptions& base);
 
@@ -59,6 +59,9 @@ struct ComparisonOptions {
 struct MethodComparison {
   bool leave_one_out = false;
   int folds = 0;
+  /// Observations that no method explains, at most a fifth: measured wrongly. They take part in no statistic
+  /// and no choice.
+  std::vector<std::size_t> unexplained;
   std::vector<CrossValidation> methods;
   std::size_t best = 0;    ///< least loss
   std::size_t chosen = 0;  ///< the simplest within one standard error of the best
@@ -74,9 +77,10 @@ struct MethodComparison {
                                                const std::vector<Candidate>& candidates,
                                                const ComparisonOptions& options = {});
 
-/// The observations as the hexapod's own frames see them, by an identification with unknown frames.
+/// Observations of unknown frames as the hexapod's own frames see them: where the nominal machine fits them
+/// best. Coordinates that were not measured take the value that this machine has. Throws InputError where the
+/// frames cannot be found.
 [[nodiscard]] ObservationSet in_hexapod_frames(const PlatformGeometry& nominal,
-                                               const ObservationSet& observations,
-                                               const IdentifyResult& identified);
+                                               const ObservationSet& observations);
 
 }  // namespace hexcal

@@ -167,6 +167,9 @@ std::string compensation_text(const CalibrationReport& report, const Observation
   if (report.uncompensated && !report.evaluations.empty()) text += fmt::format("\n{}", paper_table(report));
   if (!report.outliers.empty())
     text += fmt::format("left out as near-singular outliers: {}\n", fmt::join(report.outliers, ", "));
+  if (!report.unexplained.empty())
+    text += fmt::format("fit no method and are left out of the comparison: {}\n",
+                        fmt::join(report.unexplained, ", "));
   for (const auto& pose : table.left_out) text += fmt::format("left out {}: {}\n", pose.id, pose.reason);
   if (report.identifiability) text += fmt::format("\n{}", diagnosis(report));
   int failed = 0;
@@ -220,6 +223,7 @@ std::string compensation_json(const CalibrationReport& report, const Observation
   }
   if (report.uncompensated) out["uncompensated"] = json_of(*report.uncompensated);
   out["outliers"] = report.outliers;
+  out["unexplained"] = report.unexplained;
   for (const auto& pose : table.left_out)
     out["left_out"].push_back({{"pose", pose.id}, {"reason", pose.reason}});
   if (report.identifiability)
