@@ -43,7 +43,6 @@ bool points_can_be_free(const CalibrationState& state) { return photographs_in(s
 }  // namespace
 
 void CameraCalibrationOptions::validate() const {
-  if (folds < 2) throw InputError(fmt::format("calibrate: folds is {}, wanted at least 2", folds));
   if (f_hint_px && !(*f_hint_px > 0)) {
     throw InputError(fmt::format("calibrate: f_hint_px is {}, wanted more than 0", *f_hint_px));
   }
@@ -136,7 +135,7 @@ CameraCalibration calibrate_camera(const std::vector<Sheet>& sheets, const Calib
   CalibrationState state = reference.adjustment.state;
   double sigma = reference.extra_sigma_px;
   std::vector<ModelTrial> lens_trials = try_variants(sheets, state, sigma, lenses);
-  CameraVariant variant = lens_trials[choose_trial(sheets, state, sigma, options.folds, lens_trials)].variant;
+  CameraVariant variant = lens_trials[choose_trial(lens_trials)].variant;
   out.trials = lens_trials;
   if (!options.board) {
     std::vector<CameraVariant> boards;
@@ -146,7 +145,7 @@ CameraCalibration calibrate_camera(const std::vector<Sheet>& sheets, const Calib
       boards.push_back(variant);
     }
     std::vector<ModelTrial> trials = try_variants(sheets, state, sigma, boards);
-    variant = trials[choose_trial(sheets, state, sigma, options.folds, trials)].variant;
+    variant = trials[choose_trial(trials)].variant;
     for (const ModelTrial& trial : trials) {
       if (trial.variant.board != least) out.trials.push_back(trial);
     }
@@ -158,7 +157,7 @@ CameraCalibration calibrate_camera(const std::vector<Sheet>& sheets, const Calib
         sigma = again.extra_sigma_px;
       }
       trials = try_variants(sheets, state, sigma, with_board(lens_variants(options.lens), variant.board));
-      variant = trials[choose_trial(sheets, state, sigma, options.folds, trials)].variant;
+      variant = trials[choose_trial(trials)].variant;
       for (const ModelTrial& trial : trials) out.trials.push_back(trial);
     }
   }
@@ -166,7 +165,7 @@ CameraCalibration calibrate_camera(const std::vector<Sheet>& sheets, const Calib
   CameraVariant affine = variant;
   affine.free_parameters[1] = 1;
   std::vector<ModelTrial> shapes = try_variants(sheets, state, sigma, {variant, affine});
-  variant = shapes[choose_trial(sheets, state, sigma, options.folds, shapes)].variant;
+  variant = shapes[choose_trial(shapes)].variant;
   out.trials.push_back(shapes.back());
   for (ModelTrial& trial : out.trials) trial.chosen = trial.name == variant_name(variant);
   if (variant.board == BoardFreedom::ideal) state.shapes.assign(sheets.size(), {});

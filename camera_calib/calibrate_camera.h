@@ -13,7 +13,6 @@ struct CameraCalibrationOptions {
   std::optional<LensModel> lens;      ///< none: chosen by evidence
   std::optional<BoardFreedom> board;  ///< none: chosen by evidence
   std::optional<double> f_hint_px;    ///< from EXIF; used only where the views hardly determine f
-  int folds = 4;                      ///< of the cross-validation over photographs
 
   /// Throws InputError naming field and value.
   void validate() const;
@@ -26,7 +25,8 @@ struct ModelTrial {
   double chi2 = 0;
   int unknowns = 0;
   double aicc = 0;  ///< corrected Akaike criterion (Hurvich & Tsai 1989), relative to the best
-  std::optional<double> cross_validation_px;  ///< rms at photographs left out, their poses adjusted
+  std::vector<double> left_out_chi2;          ///< per photograph, by a camera that has not seen it
+  std::optional<double> cross_validation_px;  ///< rms of the same in px
   bool chosen = false;
 };
 
@@ -51,7 +51,7 @@ struct CameraCalibration {
                                              const std::vector<SheetPhotograph>& photographs);
 
 /// The full calibration from a rough one: lens model and freedom of the sheets are chosen by the corrected
-/// Akaike criterion and by cross-validation over photographs, unless the options say which.
+/// Akaike criterion and by cross-validation over photographs, unless the options say which (choose_model.h).
 [[nodiscard]] CameraCalibration calibrate_camera(const std::vector<Sheet>& sheets,
                                                  const CalibrationState& rough, double rough_sigma_px,
                                                  const CameraCalibrationOptions& options = {});

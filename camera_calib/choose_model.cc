@@ -2,14 +2,16 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <set>
 
 namespace hexcal {
 namespace {
+
+constexpr std::size_t kLeastPhotographs = 5;  // fewer left out one by one say little
 
 CameraVariant with_terms(LensModel lens, const std::vector<std::string>& held) {
   CameraVariant variant;
@@ -38,15 +40,56 @@ SheetAdjustmentOptions options_of(const CameraVariant& variant, double sigma_px)
   options.free_parameters = variant.free_parameters;
   options.extra_sigma_px = sigma_px;
   options.with_covariance = false;
+  options.with_left_out = true;
   options.function_tolerance = 1e-7;
   return options;
 }
 
 // Thin-prism terms trade against the principal point and against sheets that bend from photograph to
-// photograph: they must gain a tenth, not a hundredth.
-double needed_gain(const CameraVariant& variant) {
+// photograph: they must gain a tenth in px, not a hundredth.
+double handicap(const CameraVariant& variant) {
   const bool prism = variant.lens == LensModel::rational && variant.free_parameters.back() != 0;
-  return prism ? 1.1 : 1.0;
+  return prism ? 1.1 * 1.1 : 1.0;
+}
+
+// Chi^2 of the photographs left out, of two trials, photograph by photograph.
+struct Difference {
+  double sum = 0;    // the poorer one's minus the better one's
+  double sigma = 0;  // of the sum, from how photographs differ in it
+};
+
+Difference left_out_difference(const ModelTrial& poorer, const ModelTrial& better) {
+  Difference out;
+  const auto n = static_cast<double>(better.left_out_chi2.size());
+  std::vector<double> differences;
+  for (std::size_t i = 0; i < better.left_out_chi2.size(); ++i) {
+    differences.push_back(handicap(poorer.variant) * poorer.left_out_chi2[i] -
+                          handicap(better.variant) * better.left_out_chi2[i]);
+    out.sum += differences.back();
+  }
+  double squares = 0;
+  for (const double d : differences) squares += std::pow(d - out.sum / n, 2);
+  out.sigma = std::sqrt(n * squares / (n - 1));
+  return out;
+}
+
+double rms_px(const SheetAdjustmentResult& fit) {
+  double sum = 0;
+  double points = 0;
+  for (std::size_t v = 0; v < fit.residuals_px.size(); ++v) {
+    for (std::size_t f = 0; f < fit.residuals_px[v].size(); ++f) {
+      if (fit.state.views[v].rejected[f] != 0) continue;
+      sum += fit.residuals_px[v][f].squaredNorm();
+      points += 0.5 * static_cast<double>(fit.residuals_px[v][f].size());
+    }
+  }
+  return std::sqrt(sum / std::max(points, 1.0));
+}
+
+double left_out_sum(const ModelTrial& trial) {
+  double sum = 0;
+  for (const double chi2 : trial.left_out_chi2) sum += chi2;
+  return trial.left_out_chi2.empty() ? std::numeric_limits<double>::infinity() : sum;
 }
 
 }  // namespace
@@ -76,87 +119,52 @@ std::string variant_name(const CameraVariant& variant) {
 
 std::vector<ModelTrial> try_variants(const std::vector<Sheet>& sheets, const CalibrationState& state,
                                      double sigma_px, const std::vector<CameraVariant>& variants) {
-  std::vector<ModelTrial> trials;
-  double best = std::numeric_limits<double>::infinity();
-  for (const CameraVariant& variant : variants) {
+  std::vector<ModelTrial> trials(variants.size());
+  tbb::parallel_for(std::size_t{0}, variants.size(), [&](std::size_t i) {
     const SheetAdjustmentResult fit =
-        adjust_sheets(sheets, for_variant(state, variant), options_of(variant, sigma_px));
-    ModelTrial trial;
-    trial.variant = variant;
-    trial.name = variant_name(variant);
+        adjust_sheets(sheets, for_variant(state, variants[i]), options_of(variants[i], sigma_px));
+    ModelTrial& trial = trials[i];
+    trial.variant = variants[i];
+    trial.name = variant_name(variants[i]);
     trial.chi2 = fit.chi2;
     trial.unknowns = fit.unknowns;
     const double k = fit.unknowns;
     const double left = fit.observations - k - 1;
-    trial.aicc = fit.converged && left > 0 ? fit.chi2 + 2 * k + 2 * k * (k + 1) / left
-                                           : std::numeric_limits<double>::infinity();
-    best = std::min(best, trial.aicc);
-    trials.push_back(std::move(trial));
-  }
+    trial.aicc = std::numeric_limits<double>::infinity();
+    if (!fit.converged) return;
+    if (left > 0) trial.aicc = fit.chi2 + 2 * k + 2 * k * (k + 1) / left;
+    trial.left_out_chi2 = fit.left_out_chi2;
+    if (!trial.left_out_chi2.empty()) {
+      trial.cross_validation_px = rms_px(fit) * std::sqrt(left_out_sum(trial) / std::max(fit.chi2, 1e-300));
+    }
+  });
+  double best = std::numeric_limits<double>::infinity();
+  for (const ModelTrial& trial : trials) best = std::min(best, trial.aicc);
   for (ModelTrial& trial : trials) trial.aicc -= best;
   return trials;
 }
 
-double cross_validation_px(const std::vector<Sheet>& sheets, const CalibrationState& state,
-                           const CameraVariant& variant, double sigma_px, int folds) {
-  std::set<int> photographs;
-  for (const SheetView& view : state.views) photographs.insert(view.photograph);
-  std::vector<int> order(photographs.begin(), photographs.end());
-  double sum = 0;
-  double count = 0;
-  for (int fold = 0; fold < folds; ++fold) {
-    std::set<int> out;
-    for (std::size_t i = static_cast<std::size_t>(fold); i < order.size();
-         i += static_cast<std::size_t>(folds)) {
-      out.insert(order[i]);
-    }
-    const CalibrationState start = for_variant(state, variant);
-    const SheetAdjustmentResult fit =
-        adjust_sheets(sheets, views_where(start, [&out](int p) { return out.count(p) == 0; }),
-                      options_of(variant, sigma_px));
-    CalibrationState held = views_where(start, [&out](int p) { return out.count(p) != 0; });
-    if (!fit.converged || held.views.empty()) return std::numeric_limits<double>::infinity();
-    held.camera = fit.state.camera;
-    held.shapes = fit.state.shapes;
-    SheetAdjustmentOptions poses = options_of(variant, sigma_px);
-    poses.only_poses = true;
-    const SheetAdjustmentResult check = adjust_sheets(sheets, held, poses);
-    for (std::size_t v = 0; v < check.state.views.size(); ++v) {
-      for (std::size_t f = 0; f < check.residuals_px[v].size(); ++f) {
-        if (check.state.views[v].rejected[f] != 0) continue;
-        sum += check.residuals_px[v][f].squaredNorm();
-        count += static_cast<double>(check.residuals_px[v][f].size()) / 2;
-      }
+std::size_t choose_trial(std::vector<ModelTrial>& trials) {
+  const auto by_aicc = [](const ModelTrial& a, const ModelTrial& b) { return a.aicc < b.aicc; };
+  const auto by_left_out = [](const ModelTrial& a, const ModelTrial& b) {
+    return handicap(a.variant) * left_out_sum(a) < handicap(b.variant) * left_out_sum(b);
+  };
+  const bool validated = std::any_of(trials.begin(), trials.end(), [](const ModelTrial& trial) {
+    return trial.left_out_chi2.size() >= kLeastPhotographs;
+  });
+  auto chosen = validated ? std::min_element(trials.begin(), trials.end(), by_left_out)
+                          : std::min_element(trials.begin(), trials.end(), by_aicc);
+  if (validated) {
+    const auto best = chosen;
+    for (auto at = trials.begin(); at != trials.end(); ++at) {
+      if (at->unknowns >= chosen->unknowns || at->left_out_chi2.size() != best->left_out_chi2.size())
+        continue;
+      const Difference difference = left_out_difference(*at, *best);
+      if (difference.sum < difference.sigma) chosen = at;
     }
   }
-  return std::sqrt(sum / std::max(count, 1.0));
-}
-
-std::size_t choose_trial(const std::vector<Sheet>& sheets, const CalibrationState& state, double sigma_px,
-                         int folds, std::vector<ModelTrial>& trials) {
-  std::vector<std::size_t> order(trials.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::stable_sort(order.begin(), order.end(),
-                   [&trials](std::size_t a, std::size_t b) { return trials[a].aicc < trials[b].aicc; });
-  std::size_t chosen = order.front();
-  std::set<int> photographs;
-  for (const SheetView& view : state.views) photographs.insert(view.photograph);
-  // Errors that photographs share make AICc favour the richer model: only a poorer one can still win.
-  std::vector<std::size_t> rivals{chosen};
-  for (const std::size_t i : order) {
-    if (rivals.size() < 3 && trials[i].unknowns < trials[rivals.back()].unknowns) rivals.push_back(i);
-  }
-  if (rivals.size() > 1 && static_cast<int>(photographs.size()) >= 2 * folds) {
-    double best = std::numeric_limits<double>::infinity();
-    for (const std::size_t i : rivals) {
-      trials[i].cross_validation_px = cross_validation_px(sheets, state, trials[i].variant, sigma_px, folds);
-      best = std::min(best, *trials[i].cross_validation_px * needed_gain(trials[i].variant));
-    }
-    chosen = *std::find_if(rivals.rbegin(), rivals.rend(),
-                           [&](std::size_t i) { return *trials[i].cross_validation_px <= 1.01 * best; });
-  }
-  trials[chosen].chosen = true;
-  return chosen;
+  chosen->chosen = true;
+  return static_cast<std::size_t>(chosen - trials.begin());
 }
 
 }  // namespace hexcal

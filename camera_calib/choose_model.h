@@ -11,19 +11,16 @@ namespace hexcal {
 
 [[nodiscard]] std::string variant_name(const CameraVariant& variant);
 
-/// Fits every variant to the same features with the same noise and ranks them by AICc.
+/// Fits every variant to the same features with the same noise. Runs in the caller's TBB arena; the result
+/// does not depend on the number of threads.
 [[nodiscard]] std::vector<ModelTrial> try_variants(const std::vector<Sheet>& sheets,
                                                    const CalibrationState& state, double sigma_px,
                                                    const std::vector<CameraVariant>& variants);
 
-/// Rms in px at photographs that a fit has not seen, over `folds` fits.
-[[nodiscard]] double cross_validation_px(const std::vector<Sheet>& sheets, const CalibrationState& state,
-                                         const CameraVariant& variant, double sigma_px, int folds);
-
-/// Marks and returns the chosen trial: the best by AICc, or a poorer one (at most the two next ones) whose
-/// cross-validation is within 1 % of the best. The poorest such model wins.
-std::size_t choose_trial(const std::vector<Sheet>& sheets, const CalibrationState& state, double sigma_px,
-                         int folds, std::vector<ModelTrial>& trials);
+/// Marks and returns the chosen trial: the poorest whose photographs left out one by one fit no worse than
+/// with the best, as far as the spread between photographs can tell (the one-standard-error rule, Breiman et
+/// al. 1984, on paired differences). With fewer than five photographs the best by AICc.
+std::size_t choose_trial(std::vector<ModelTrial>& trials);
 
 /// The state with only those views for which keep(photograph) holds.
 template <typename Keep>

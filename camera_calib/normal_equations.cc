@@ -10,72 +10,90 @@
 namespace hexcal {
 namespace {
 
-// Normal equations in the form [A B; B^T D] with D block diagonal.
-struct Bordered {
-  Eigen::MatrixXd shared;                // A
-  std::vector<Eigen::MatrixXd> borders;  // columns of B per pose
-  std::vector<Matrix6d> poses;           // blocks of D
-};
-
-Bordered accumulate(const SparseRows& j, int shared_columns) {
-  const int num_poses = (j.columns - shared_columns) / 6;
-  Bordered n;
-  n.shared = Eigen::MatrixXd::Zero(shared_columns, shared_columns);
-  n.borders.assign(static_cast<std::size_t>(num_poses), Eigen::MatrixXd::Zero(shared_columns, 6));
-  n.poses.assign(static_cast<std::size_t>(num_poses), Matrix6d::Zero());
+// The rows of each pose, and of none (priors) last.
+std::vector<std::vector<int>> rows_by_pose(const SparseRows& j, int shared_columns) {
+  const auto num_poses = static_cast<std::size_t>((j.columns - shared_columns) / 6);
+  std::vector<std::vector<int>> rows(num_poses + 1);
   for (std::size_t row = 0; row + 1 < j.starts.size(); ++row) {
-    const auto begin = static_cast<std::size_t>(j.starts[row]);
-    const auto end = static_cast<std::size_t>(j.starts[row + 1]);
-    for (std::size_t a = begin; a < end; ++a) {
-      for (std::size_t b = begin; b < end; ++b) {
-        const double product = j.values[a] * j.values[b];
-        const int ca = j.indices[a];
-        const int cb = j.indices[b];
-        if (cb < shared_columns) {
-          if (ca < shared_columns) n.shared(ca, cb) += product;
-        } else {
-          const auto pose = static_cast<std::size_t>((cb - shared_columns) / 6);
-          const int within = (cb - shared_columns) % 6;
-          if (ca < shared_columns) {
-            n.borders[pose](ca, within) += product;
-          } else {
-            n.poses[pose]((ca - shared_columns) % 6, within) += product;
-          }
-        }
+    std::size_t pose = num_poses;
+    for (auto at = static_cast<std::size_t>(j.starts[row]); at < static_cast<std::size_t>(j.starts[row + 1]);
+         ++at) {
+      if (j.indices[at] >= shared_columns) {
+        pose = static_cast<std::size_t>((j.indices[at] - shared_columns) / 6);
+        break;
+      }
+    }
+    rows[pose].push_back(static_cast<int>(row));
+  }
+  return rows;
+}
+
+ReducedBlock reduced_block(const SparseRows& j, const std::vector<double>& residuals, std::vector<int> rows,
+                           int shared_columns) {
+  ReducedBlock block;
+  const auto count = static_cast<Eigen::Index>(rows.size());
+  block.jacobian = Eigen::MatrixXd::Zero(count, shared_columns);
+  block.residuals.resize(count);
+  Eigen::MatrixXd by_pose = Eigen::MatrixXd::Zero(count, 6);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const auto row = static_cast<std::size_t>(rows[static_cast<std::size_t>(i)]);
+    block.residuals[i] = residuals[row];
+    for (auto at = static_cast<std::size_t>(j.starts[row]); at < static_cast<std::size_t>(j.starts[row + 1]);
+         ++at) {
+      const int column = j.indices[at];
+      if (column < shared_columns) {
+        block.jacobian(i, column) = j.values[at];
+      } else {
+        by_pose(i, (column - shared_columns) % 6) = j.values[at];
       }
     }
   }
-  return n;
+  block.rows = std::move(rows);
+  block.pose_inverse = Matrix6d(by_pose.transpose() * by_pose).ldlt().solve(Matrix6d::Identity());
+  block.pose_by_shared = -block.pose_inverse * (by_pose.transpose() * block.jacobian);
+  block.jacobian.noalias() += by_pose * block.pose_by_shared;
+  return block;
 }
 
 }  // namespace
 
-BorderedCovariance bordered_covariance(const SparseRows& jacobian, int shared_columns) {
-  Bordered n = accumulate(jacobian, shared_columns);
-  std::vector<Matrix6d> inverses;
-  std::vector<Eigen::MatrixXd> eliminated;  // B D^-1 per pose
-  for (std::size_t i = 0; i < n.poses.size(); ++i) {
-    inverses.push_back(n.poses[i].ldlt().solve(Matrix6d::Identity()));
-    eliminated.push_back(n.borders[i] * inverses.back());
-    n.shared.noalias() -= eliminated.back() * n.borders[i].transpose();
+ReducedSystem reduced_system(const SparseRows& jacobian, const std::vector<double>& residuals,
+                             int shared_columns) {
+  ReducedSystem system;
+  std::vector<std::vector<int>> rows = rows_by_pose(jacobian, shared_columns);
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(shared_columns, shared_columns);
+  for (const int row : rows.back()) {
+    const auto begin = static_cast<std::size_t>(jacobian.starts[static_cast<std::size_t>(row)]);
+    const auto end = static_cast<std::size_t>(jacobian.starts[static_cast<std::size_t>(row) + 1]);
+    for (std::size_t a = begin; a < end; ++a) {
+      for (std::size_t b = begin; b < end; ++b) {
+        information(jacobian.indices[a], jacobian.indices[b]) += jacobian.values[a] * jacobian.values[b];
+      }
+    }
   }
-  BorderedCovariance out;
-  if (shared_columns > 0) {
-    // Lens coefficients of different powers differ by many orders: scale to a unit diagonal before factoring.
-    const Eigen::VectorXd scale = n.shared.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    const Eigen::MatrixXd scaled = scale.asDiagonal() * n.shared * scale.asDiagonal();
-    const Eigen::LLT<Eigen::MatrixXd> llt(scaled);
-    if (llt.info() != Eigen::Success) return out;
-    out.shared = scale.asDiagonal() * llt.solve(Eigen::MatrixXd::Identity(shared_columns, shared_columns)) *
-                 scale.asDiagonal();
-    out.shared = 0.5 * (out.shared + out.shared.transpose()).eval();
+  rows.pop_back();
+  for (std::vector<int>& of_pose : rows) {
+    system.blocks.push_back(reduced_block(jacobian, residuals, std::move(of_pose), shared_columns));
+    information.selfadjointView<Eigen::Lower>().rankUpdate(system.blocks.back().jacobian.transpose());
   }
-  for (std::size_t i = 0; i < n.poses.size(); ++i) {
-    Matrix6d covariance = inverses[i];
-    if (shared_columns > 0) covariance += eliminated[i].transpose() * out.shared * eliminated[i];
-    out.poses.push_back(covariance);
-  }
-  return out;
+  if (shared_columns == 0) return system;
+  // Lens coefficients of different powers differ by many orders: scale to a unit diagonal before factoring.
+  const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled =
+      scale.asDiagonal() * Eigen::MatrixXd(information.selfadjointView<Eigen::Lower>()) * scale.asDiagonal();
+  const Eigen::LLT<Eigen::MatrixXd> llt(scaled);
+  if (llt.info() != Eigen::Success) return system;
+  system.covariance = scale.asDiagonal() *
+                      llt.solve(Eigen::MatrixXd::Identity(shared_columns, shared_columns)) *
+                      scale.asDiagonal();
+  system.covariance = 0.5 * (system.covariance + system.covariance.transpose()).eval();
+  return system;
+}
+
+Matrix6d ReducedSystem::pose_covariance(std::size_t block, const Eigen::MatrixXd& shared) const {
+  const ReducedBlock& b = blocks[block];
+  if (shared.size() == 0) return b.pose_inverse;
+  return b.pose_inverse + b.pose_by_shared * shared * b.pose_by_shared.transpose();
 }
 
 Matrix6d pose_perturbation_covariance(const Matrix6d& covariance, const std::array<double, 6>& pose) {

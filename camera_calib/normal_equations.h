@@ -16,13 +16,26 @@ struct SparseRows {
   const std::vector<double>& values;
 };
 
-/// Inverse of J^T J whose last columns are poses of six columns each that no row shares.
-struct BorderedCovariance {
-  Eigen::MatrixXd shared;       ///< of the leading columns; empty if the system is singular
-  std::vector<Matrix6d> poses;  ///< of each pose
+/// The whitened rows of one pose with the pose eliminated: what they say of the shared unknowns alone.
+struct ReducedBlock {
+  std::vector<int> rows;           ///< numbers in the whole system
+  Eigen::MatrixXd jacobian;        ///< rows x shared
+  Eigen::VectorXd residuals;       ///< at the solution
+  Matrix6d pose_inverse;           ///< of the pose's own normal equations
+  Eigen::MatrixXd pose_by_shared;  ///< 6 x shared: how the pose follows the shared unknowns
 };
 
-[[nodiscard]] BorderedCovariance bordered_covariance(const SparseRows& jacobian, int shared_columns);
+/// A least-squares system whose last columns are poses of six columns each that no row shares.
+struct ReducedSystem {
+  std::vector<ReducedBlock> blocks;  ///< one per pose
+  Eigen::MatrixXd covariance;        ///< of the leading, shared columns; empty if the system is singular
+
+  /// With `shared` as the covariance of the shared unknowns, for instance `covariance`.
+  [[nodiscard]] Matrix6d pose_covariance(std::size_t block, const Eigen::MatrixXd& shared) const;
+};
+
+[[nodiscard]] ReducedSystem reduced_system(const SparseRows& jacobian, const std::vector<double>& residuals,
+                                           int shared_columns);
 
 /// From a covariance of (rotation vector, translation) to that of the perturbation (dt, dr) of covariance.h.
 [[nodiscard]] Matrix6d pose_perturbation_covariance(const Matrix6d& covariance,

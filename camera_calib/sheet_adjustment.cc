@@ -125,6 +125,9 @@ struct Network {
   std::unique_ptr<ceres::Problem> problem;
   std::vector<double*> shared;  // free blocks that views have in common: camera, deformations, shifts
   std::vector<double*> poses;
+  std::vector<ceres::ResidualBlockId> blocks;  // of the features used, in the order of `used`
+  std::vector<UsedFeature> used;
+  std::vector<ceres::ResidualBlockId> priors;
   int free_camera = 0;
   int unknowns = 0;
 };
@@ -146,7 +149,8 @@ void add_camera(Network& network, Blocks& blocks, const CameraModel& camera,
     problem.SetManifold(blocks.camera.data(), new ceres::SubsetManifold(static_cast<int>(free.size()), held));
   }
   const ParameterPrior prior = weak_camera_prior(camera);
-  problem.AddResidualBlock(new PriorCost(prior.mean, prior.sigma), nullptr, blocks.camera.data());
+  network.priors.push_back(
+      problem.AddResidualBlock(new PriorCost(prior.mean, prior.sigma), nullptr, blocks.camera.data()));
   network.shared.push_back(blocks.camera.data());
   network.free_camera = static_cast<int>(free.size() - held.size());
   network.unknowns += network.free_camera;
@@ -166,7 +170,8 @@ void add_sheets(Network& network, Blocks& blocks, const std::vector<DrawnSheet>&
     const double diagonal =
         drawn[static_cast<std::size_t>(&deformation - blocks.deformations.data())].diagonal_mm;
     sigma << 0.05, 0.05, 0.05 * diagonal, 0.05 * diagonal, 0.05 * diagonal;
-    problem.AddResidualBlock(new PriorCost(Eigen::VectorXd::Zero(5), sigma), nullptr, deformation.data());
+    network.priors.push_back(problem.AddResidualBlock(new PriorCost(Eigen::VectorXd::Zero(5), sigma), nullptr,
+                                                      deformation.data()));
     network.shared.push_back(deformation.data());
     network.unknowns += 5;
   }
@@ -180,9 +185,9 @@ void add_sheets(Network& network, Blocks& blocks, const std::vector<DrawnSheet>&
     const int size = problem.ParameterBlockSize(shift.data());
     const double diagonal = drawn[static_cast<std::size_t>(key.first)].diagonal_mm;
     const double sigma = options.point_prior_mm > 0 ? options.point_prior_mm : 0.005 * diagonal;
-    problem.AddResidualBlock(
+    network.priors.push_back(problem.AddResidualBlock(
         new PriorCost(Eigen::VectorXd::Zero(size), Eigen::VectorXd::Constant(size, sigma)), nullptr,
-        shift.data());
+        shift.data()));
     network.shared.push_back(shift.data());
     network.unknowns += size;
     free_points[key.first] += size / 3;
@@ -213,10 +218,11 @@ Network build(const std::vector<DrawnSheet>& drawn, const CalibrationState& stat
       if (view.rejected[f] != 0) continue;
       ceres::LossFunction* loss =
           options.robust ? new ceres::HuberLoss(feature.points() == 4 ? kHuber8 : kHuber2) : nullptr;
-      network.problem->AddResidualBlock(new FeatureCost(network.models[v].back()), loss, blocks.camera.data(),
-                                        blocks.poses[v].data(),
-                                        blocks.deformations[static_cast<std::size_t>(view.sheet)].data(),
-                                        blocks.shifts.at({view.sheet, feature.first_point}).data());
+      network.blocks.push_back(network.problem->AddResidualBlock(
+          new FeatureCost(network.models[v].back()), loss, blocks.camera.data(), blocks.poses[v].data(),
+          blocks.deformations[static_cast<std::size_t>(view.sheet)].data(),
+          blocks.shifts.at({view.sheet, feature.first_point}).data()));
+      network.used.push_back({view.photograph, view.sheet, &feature});
       used = true;
     }
     if (!used) continue;
@@ -283,30 +289,45 @@ Eigen::MatrixXd with_held(const Eigen::MatrixXd& covariance, const std::vector<c
   return out;
 }
 
-void add_covariance(const Network& network, const Blocks& blocks, const SheetAdjustmentOptions& options,
-                    SheetAdjustmentResult& result) {
+// The system at the solution: rows of the features in the order of Network::used, then the priors'.
+ReducedSystem system_of(const Network& network) {
   ceres::Problem::EvaluateOptions evaluate;
   evaluate.apply_loss_function = false;
   evaluate.num_threads = 1;
   evaluate.parameter_blocks = network.shared;
   evaluate.parameter_blocks.insert(evaluate.parameter_blocks.end(), network.poses.begin(),
                                    network.poses.end());
+  evaluate.residual_blocks = network.blocks;
+  evaluate.residual_blocks.insert(evaluate.residual_blocks.end(), network.priors.begin(),
+                                  network.priors.end());
   ceres::CRSMatrix crs;
-  network.problem->Evaluate(evaluate, nullptr, nullptr, nullptr, &crs);
+  std::vector<double> residuals;
+  network.problem->Evaluate(evaluate, nullptr, &residuals, nullptr, &crs);
   const auto poses = static_cast<int>(network.poses.size());
-  const BorderedCovariance covariance =
-      bordered_covariance({crs.num_cols, crs.rows, crs.cols, crs.values}, crs.num_cols - 6 * poses);
-  if (covariance.shared.size() == 0 && network.free_camera > 0) return;
+  return reduced_system({crs.num_cols, crs.rows, crs.cols, crs.values}, residuals, crs.num_cols - 6 * poses);
+}
+
+void add_statistics(const Network& network, const Blocks& blocks, const SheetAdjustmentOptions& options,
+                    SheetAdjustmentResult& result) {
+  ReducedSystem system = system_of(network);
+  if (options.with_left_out) result.left_out_chi2 = left_out_chi2(system, network.used);
+  if (!options.with_covariance || (system.covariance.size() == 0 && network.free_camera > 0)) return;
   if (network.free_camera > 0) {
-    result.camera_covariance =
-        with_held(covariance.shared.topLeftCorner(network.free_camera, network.free_camera),
-                  free_camera(result.state.camera, options));
+    const auto camera_part = [&](const Eigen::MatrixXd& covariance) {
+      return with_held(covariance.topLeftCorner(network.free_camera, network.free_camera),
+                       free_camera(result.state.camera, options));
+    };
+    result.shared_errors = shared_error_factors(system, network.used, result.state.camera, camera_part,
+                                                result.sigma0() * result.sigma0());
+    system.covariance *= result.shared_errors.largest() * result.shared_errors.largest();
+    result.camera_covariance = camera_part(system.covariance);
   }
   std::size_t at = 0;
   for (std::size_t v = 0; v < blocks.poses.size(); ++v) {
     result.pose_covariance.emplace_back(Eigen::Matrix<double, 6, 6>::Zero());
     if (at < network.poses.size() && network.poses[at] == blocks.poses[v].data()) {
-      result.pose_covariance.back() = pose_perturbation_covariance(covariance.poses[at], blocks.poses[v]);
+      result.pose_covariance.back() =
+          pose_perturbation_covariance(system.pose_covariance(at, system.covariance), blocks.poses[v]);
       ++at;
     }
   }
@@ -349,7 +370,9 @@ SheetAdjustmentResult adjust_sheets(const std::vector<Sheet>& sheets, const Cali
   store(blocks, drawn, result.state);
   result.unknowns = network.unknowns;
   add_residuals(network, blocks, result);
-  if (options.with_covariance && result.converged) add_covariance(network, blocks, options, result);
+  if ((options.with_covariance || options.with_left_out) && result.converged) {
+    add_statistics(network, blocks, options, result);
+  }
   return result;
 }
 

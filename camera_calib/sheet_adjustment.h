@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "camera_calib/shared_error_factor.h"
 #include "camera_calib/sheet.h"
 #include "camera_calib/sheet_observation.h"
 #include "kinematics/geometry/rigid3.h"
@@ -57,6 +58,7 @@ struct SheetAdjustmentOptions {
   bool robust = false;      ///< Huber's loss at the 99 % point of each feature's chi^2
   bool only_poses = false;  ///< camera and boards stay: for photographs left out of a calibration
   bool with_covariance = true;
+  bool with_left_out = false;
   int max_iterations = 50;
   double function_tolerance = 1e-10;  ///< relative change of the cost at which to stop
   double point_prior_mm = 0;          ///< free points: sigma of a shift; 0: 0.5 % of the sheet's diagonal
@@ -66,11 +68,15 @@ struct SheetAdjustmentResult {
   bool converged = false;
   CalibrationState state;
   std::vector<std::vector<FeatureObservation::Vector>>
-      residuals_px;                   ///< per view and feature, measured - model
-  double chi2 = 0;                    ///< of the whitened residuals that were used, without priors
-  int observations = 0;               ///< coordinates used
-  int unknowns = 0;                   ///< free ones, less those that only the priors determine
-  Eigen::MatrixXd camera_covariance;  ///< n x n, not scaled by sigma0; zero rows for fixed parameters
+      residuals_px;      ///< per view and feature, measured - model
+  double chi2 = 0;       ///< of the whitened residuals that were used, without priors
+  int observations = 0;  ///< coordinates used
+  int unknowns = 0;      ///< free ones, less those that only the priors determine
+  SharedErrorFactors shared_errors;
+  /// Per photograph with views: its chi^2 by a camera that has not seen it (with_left_out).
+  std::vector<double> left_out_chi2;
+  /// n x n, widened by shared_errors.largest(), not scaled by sigma0; zero rows for fixed parameters.
+  Eigen::MatrixXd camera_covariance;
   std::vector<Eigen::Matrix<double, 6, 6>> pose_covariance;  ///< per view, perturbation of covariance.h
 
   [[nodiscard]] double sigma0() const {

@@ -96,7 +96,7 @@ TEST(CalibrateCamera, AWrongTagSizeIsNamed) {
   ASSERT_EQ(rough.status, CalibrationStatus::ok);
   const CameraCalibration calibration =
       calibrate_camera(wrong, rough.fit.adjustment.state, rough.fit.extra_sigma_px,
-                       {LensModel::brown, BoardFreedom::warped, {}, 4});
+                       {LensModel::brown, BoardFreedom::warped, {}});
   const CameraReport report = report_calibration(wrong, photographs, calibration);
   EXPECT_THAT(words(report), testing::HasSubstr("larger for their spacing than the template says"));
 }
@@ -109,9 +109,9 @@ TEST(CalibrateCamera, RefusesWhatIsNoCalibration) {
   EXPECT_EQ(calibration.status, CalibrationStatus::too_few_photographs);
   EXPECT_THAT(calibration.reason, testing::HasSubstr("2 photographs"));
   EXPECT_NO_THROW(CameraCalibrationOptions{}.validate());
-  CameraCalibrationOptions one_fold;
-  one_fold.folds = 1;
-  EXPECT_THROW(one_fold.validate(), InputError);
+  CameraCalibrationOptions no_length;
+  no_length.f_hint_px = -1;
+  EXPECT_THROW(no_length.validate(), InputError);
 }
 
 // Over many calibrations the true error of projection divided by its predicted sigma has unit variance.
@@ -153,7 +153,7 @@ TEST(CalibrateCamera, PredictedUncertaintyIsTheErrorsUncertainty) {
 }
 
 TEST(CompareCameras, NoiseIsNotSignificantAnotherZoomIs) {
-  const CameraCalibrationOptions radial{LensModel::radial, BoardFreedom::ideal, {}, 4};
+  const CameraCalibrationOptions radial{LensModel::radial, BoardFreedom::ideal, {}};
   const CameraCalibration one = calibrate(at_35_mm(), radial);
   SyntheticSheets again = at_35_mm();
   again.seed = 7;
