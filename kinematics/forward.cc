@@ -53,8 +53,8 @@ void conclude(const Solver& solver, const LegVector& lengths_mm, const Rigid3& B
   result.B_from_P = B_from_P;
   result.status = ForwardStatus::converged;
   if (!options.enforce_limits) return;
-  const InverseResult verdict = inverse_kinematics(solver.geometry, RestState(solver.geometry), B_from_P,
-                                                   {.singularity = false, .near = {}});
+  const InverseResult verdict =
+      inverse_kinematics(solver.geometry, RestState(solver.geometry), B_from_P, {.singularity = false});
   if (verdict.reachable()) return;
   result.status = ForwardStatus::left_workspace;
   result.reason = reason(verdict);

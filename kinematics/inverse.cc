@@ -160,8 +160,14 @@ InverseResult inverse_kinematics(const PlatformGeometry& geometry, const RestSta
   if (geometry.leg_radius_mm) clearance = leg_clearance(geometry, B_from_P);
   result.clearance_mm = clearance.mm;
   bool same_side = true;
-  if (options.singularity) {
-    result.singularity = options.near.characteristic_length_mm > 0
+  SingularityBounds bounds;
+  const bool own_length = options.near.characteristic_length_mm > 0;
+  if (options.singularity && !options.measure_all && !own_length)
+    bounds = singularity_bounds(geometry, B_from_P, rest.home_singularity.characteristic_length_mm);
+  if (options.singularity && bounds.clear_of(options.near, rest.home_singularity)) {
+    same_side = bounds.determinant * rest.home_singularity.determinant > 0;
+  } else if (options.singularity) {
+    result.singularity = own_length
                              ? singularity_measures(geometry, B_from_P, options.near)
                              : singularity_measures(geometry, rest.home_singularity, B_from_P, options.near);
     same_side = result.singularity->same_side_as_home;

@@ -37,7 +37,8 @@ struct RestState {
 
 struct InverseOptions {
   bool singularity = true;  ///< off: no singular value decomposition; only the determinant's sign is judged
-  SingularityOptions near;
+  bool measure_all = true;  ///< off: poses that are clearly not near-singular get no measures, only a verdict
+  SingularityOptions near{};
 };
 
 /// All that can be said of a pose. Margins are positive inside the limits.

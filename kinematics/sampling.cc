@@ -80,8 +80,8 @@ PoseBox widened(PoseBox box, double part) {
 // The pose with the largest stroke margin that a search along the axes finds from home.
 Pose most_central(const PlatformGeometry& geometry, const RestState& rest) {
   const auto margin = [&](const Vector6d& v) {
-    const InverseResult r = inverse_kinematics(geometry, rest, geometry.B_from_P(Pose::from_vector(v)),
-                                               {.singularity = false, .near = {}});
+    const InverseResult r =
+        inverse_kinematics(geometry, rest, geometry.B_from_P(Pose::from_vector(v)), {.singularity = false});
     return r.verdict == PoseVerdict::reachable || r.verdict == PoseVerdict::too_long ||
                    r.verdict == PoseVerdict::too_short
                ? r.stroke_margin_mm
@@ -185,8 +185,7 @@ bool is_valid(const PlatformGeometry& geometry, const RestState& rest, const Pos
           length <= a.max_mm - margins.stroke_mm + slack_mm))
       return false;
   }
-  const InverseResult result =
-      inverse_kinematics(geometry, rest, B_from_P, {.singularity = false, .near = {}});
+  const InverseResult result = inverse_kinematics(geometry, rest, B_from_P, {.singularity = false});
   if (!(result.reachable() && result.stroke_margin_mm >= margins.stroke_mm &&
         result.joint_margin_rad >= margins.joint_rad && result.clearance_mm >= margins.clearance_mm))
     return false;

@@ -8,6 +8,7 @@
 
 #include "kinematics/geometry/covariance.h"
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/leg_elimination.h"
 
 namespace hexcal {
 namespace {
@@ -85,7 +86,8 @@ Matrix6d scaled_jacobian(const PlatformGeometry& geometry, const Rigid3& B_from_
   return j;
 }
 
-HomeSingularity::HomeSingularity(const PlatformGeometry& geometry, double length_mm) {
+HomeSingularity::HomeSingularity(const PlatformGeometry& geometry, double length_mm)
+    : characteristic_length_mm(length_mm) {
   const Matrix6d j = scaled_jacobian(geometry, geometry.home_B_from_P(), length_mm);
   determinant = j.determinant();
   sigma_min = j.jacobiSvd().singularValues()[5];
@@ -123,6 +125,40 @@ SingularityMeasures singularity_measures(const PlatformGeometry& geometry, const
   m.near_singular = m.distance_mm < options.near_mm || m.distance_deg < options.near_deg ||
                     m.sigma_min * options.near_gain < home.sigma_min;
   return m;
+}
+
+SingularityBounds singularity_bounds(const PlatformGeometry& geometry, const Rigid3& B_from_P,
+                                     double length_mm) {
+  const Matrix6d j = scaled_jacobian(geometry, B_from_P, length_mm);
+  LegElimination::Columns columns;
+  for (std::size_t k = 0; k < 6; ++k) columns[k] = j.col(static_cast<Eigen::Index>(k)).array();
+  LegElimination elimination;
+  SingularityBounds bounds;
+  if (!elimination.factor(columns)) {
+    bounds.determinant = j.determinant();
+    return bounds;
+  }
+  bounds.determinant = elimination.determinant();
+  double inverse2 = 0;
+  for (Eigen::Index i = 0; i < 6; ++i)
+    inverse2 += elimination.solve(LegElimination::Lanes(Vector6d::Unit(i).array())).squaredNorm();
+  if (!(inverse2 <= std::numeric_limits<double>::max())) return bounds;
+  bounds.sigma_min = 1 / std::sqrt(inverse2);
+  // The terms of sigma_gradient at their largest: |s|^2 <= 1 + (arm / length)^2, |w| <= 1 / length, and the
+  // six legs' weights make a unit vector.
+  const Eigen::Vector3d centroid = platform_centroid_mm(geometry);
+  double by_mm2 = 0;
+  double by_rad2 = 0;
+  for (std::size_t i = 0; i < 6; ++i) {
+    const double arm2 = (geometry.platform_joints_mm[i] - centroid).squaredNorm();
+    const Eigen::Vector3d d = B_from_P * geometry.platform_joints_mm[i] - geometry.base_joints_mm[i];
+    const double by_joint2 = (1 + arm2 / (length_mm * length_mm)) / d.squaredNorm();
+    by_mm2 += by_joint2;
+    by_rad2 += arm2 * std::pow(std::sqrt(by_joint2) + 1 / length_mm, 2);
+  }
+  bounds.distance_mm = bounds.sigma_min / std::sqrt(by_mm2);
+  bounds.distance_deg = bounds.sigma_min / std::sqrt(by_rad2) * kDegPerRad;
+  return bounds;
 }
 
 }  // namespace hexcal

@@ -36,6 +36,7 @@ struct SingularityMeasures {
 struct HomeSingularity {
   HomeSingularity(const PlatformGeometry& geometry, double characteristic_length_mm);
 
+  double characteristic_length_mm = 0;
   double determinant = 0;
   double sigma_min = 0;
 };
@@ -49,6 +50,25 @@ struct HomeSingularity {
 [[nodiscard]] SingularityMeasures singularity_measures(const PlatformGeometry& geometry,
                                                        const HomeSingularity& home, const Rigid3& B_from_P,
                                                        const SingularityOptions& options = {});
+
+/// What these measures are at least, without singular values, and the determinant itself: a tenth of the time
+/// of the measures, and enough to see that a pose is far from singular. All but the determinant are zero
+/// where nothing is known.
+struct SingularityBounds {
+  double determinant = 0;
+  double sigma_min = 0;  ///< 1 / Frobenius norm of the inverse
+  double distance_mm = 0;
+  double distance_deg = 0;
+
+  /// The pose cannot be near_singular by these options.
+  [[nodiscard]] bool clear_of(const SingularityOptions& options, const HomeSingularity& home) const {
+    return distance_mm >= options.near_mm && distance_deg >= options.near_deg &&
+           sigma_min * options.near_gain >= home.sigma_min;
+  }
+};
+
+[[nodiscard]] SingularityBounds singularity_bounds(const PlatformGeometry& geometry, const Rigid3& B_from_P,
+                                                   double characteristic_length_mm);
 
 /// leg_jacobian at the centroid of the platform joints, rotations divided by the length: no unit.
 [[nodiscard]] Matrix6d scaled_jacobian(const PlatformGeometry& geometry, const Rigid3& B_from_P,

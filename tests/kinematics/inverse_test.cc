@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <random>
+
 #include "kinematics/geometry/input_error.h"
 #include "tests/support/hexapods.h"
 #include "tests/support/rigid_matchers.h"
@@ -137,6 +139,32 @@ TEST(Singularity, DoesNotDependOnFrameOrUnit) {
   const Rigid3 far(B_from_P.rotation, 10 * B_from_P.translation);
   EXPECT_NEAR(singularity_measures(large, far).sigma_min, here.sigma_min, 1e-12);
   EXPECT_NEAR(singularity_measures(large, far).distance_mm, 10 * here.distance_mm, 1e-7);
+}
+
+TEST(Singularity, BoundsAreBelowTheMeasuresAndKeepTheVerdict) {
+  std::mt19937_64 random(23);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int clear = 0;
+  for (PlatformGeometry g : {surrogate_hexapod(), nategh_agheli_hexapod(), jugglebot_hexapod()}) {
+    for (Actuator& a : g.actuators) a = {0, 1, 1, 5000};
+    g.joint_limits.reset();
+    const RestState rest(g);
+    for (int n = 0; n < 400; ++n) {
+      Vector6d p;
+      for (Eigen::Index k = 0; k < 6; ++k) p[k] = u(random) * (k < 3 ? 200 : 1.8);
+      const Rigid3 B_from_P = g.B_from_P(Pose::from_vector(p));
+      const SingularityMeasures m = singularity_measures(g, B_from_P);
+      const SingularityBounds b = singularity_bounds(g, B_from_P, m.characteristic_length_mm);
+      EXPECT_LE(b.sigma_min, m.sigma_min * (1 + 1e-9));
+      EXPECT_LE(b.distance_mm, m.distance_mm * (1 + 1e-9));
+      EXPECT_LE(b.distance_deg, m.distance_deg * (1 + 1e-9));
+      EXPECT_NEAR(b.determinant, m.determinant, 1e-9);
+      const InverseResult quick = inverse_kinematics(g, rest, B_from_P, {.measure_all = false});
+      EXPECT_EQ(quick.verdict, inverse_kinematics(g, rest, B_from_P).verdict);
+      clear += quick.singularity ? 0 : 1;
+    }
+  }
+  EXPECT_GT(clear, 300);
 }
 
 TEST(Singularity, RefusesOptionsByName) {

@@ -31,8 +31,8 @@ struct Answer {
 // Readings are written even where the pose cannot be held, with the limit that it breaks as status: they tell
 // by how much.
 Answer solve(const Machine& machine, const Pose& pose) {
-  const InverseResult verdict =
-      inverse_kinematics(machine.geometry, machine.rest, machine.geometry.B_from_P(pose));
+  const InverseResult verdict = inverse_kinematics(machine.geometry, machine.rest,
+                                                   machine.geometry.B_from_P(pose), {.measure_all = false});
   Answer answer{name(verdict.verdict), verdict.readings, reason(verdict)};
   if (machine.model) {
     answer.readings = readings_for_pose(*machine.model, pose);

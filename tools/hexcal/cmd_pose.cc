@@ -44,7 +44,8 @@ Answer solve(const Machine& machine, const LegVector& readings) {
   const ForwardResult forward = forward_kinematics(g, lengths_from_readings(g, readings));
   if (!forward.B_from_P) return {name(forward.status), std::nullopt, forward.reason};
   Answer answer{"ok", g.pose_from_B_from_P(*forward.B_from_P), ""};
-  const InverseResult verdict = inverse_kinematics(g, machine.rest, *forward.B_from_P);
+  const InverseResult verdict =
+      inverse_kinematics(g, machine.rest, *forward.B_from_P, {.measure_all = false});
   if (!verdict.reachable()) {
     answer.status = name(verdict.verdict);
     answer.reason = reason(verdict);
