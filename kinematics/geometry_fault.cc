@@ -2,13 +2,15 @@
 #include <cmath>
 
 #include "kinematics/platform.h"
+#include "kinematics/singularity.h"
 
 namespace hexcal {
 namespace {
 
 // Relative to the machine's size; joints of real machines stand millimetres apart.
 constexpr double kCoincident = 1e-6;
-constexpr double kSingular = 1e-9;
+// Joints written with three decimals leave this much of an exact singularity.
+constexpr double kSingular = 1e-5;
 
 std::string leg(std::size_t i) { return "leg " + std::to_string(i + 1); }
 
@@ -76,11 +78,9 @@ std::optional<std::string> joint_fault(const PlatformGeometry& g) {
   return std::nullopt;
 }
 
-// Smallest over largest singular value with rotations in characteristic lengths.
+// Smallest over largest singular value.
 double relative_sigma_min(const PlatformGeometry& g, const Rigid3& B_from_P) {
-  Matrix6d j = leg_jacobian(g, B_from_P);
-  j.rightCols<3>() /= characteristic_length_mm(g);
-  const Eigen::JacobiSVD<Matrix6d> svd(j);
+  const Eigen::JacobiSVD<Matrix6d> svd(scaled_jacobian(g, B_from_P, characteristic_length_mm(g)));
   return svd.singularValues()[5] / svd.singularValues()[0];
 }
 

@@ -145,7 +145,8 @@ SampleResult sample_load_paths(const PlatformGeometry& geometry, const RestState
     const std::size_t n = result.tries++;
     const double moved = start + radical_inverse(n / ways.size() + 1, 2);
     const double depth = (1 - (moved - std::floor(moved))) * options.load_fraction;
-    const Pose pose = Pose::from_vector(ways[n % ways.size()] * depth);
+    // Adding zero takes the sign off zeros.
+    const Pose pose = Pose::from_vector(ways[n % ways.size()] * depth + Vector6d::Zero());
     if (is_valid(geometry, rest, pose, options.margins)) result.poses.push_back(pose);
   }
   return result;

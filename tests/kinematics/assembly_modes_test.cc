@@ -108,5 +108,26 @@ TEST(Forward, ReproducesCdslsNumbers) {
   EXPECT_THAT(*r.B_from_P, RigidNear(pose, 1e-9, 1e-9));
 }
 
+// LinuxCNC's simulated hexapod (configs/sim/axis/vismach/hexapod-sim): home at z = 20 has six legs
+// of 29.7466.
+TEST(Forward, ReproducesLinuxCncsHome) {
+  PlatformGeometry g;
+  const std::array<double, 6> ax{-22.95, 22.95, 22.95, 0, 0, -22.95};
+  const std::array<double, 6> ay{13.25, 13.25, 13.25, -26.5, -26.5, 13.25};
+  const std::array<double, 6> bx{-1, 1, 10.459, 9.459, -9.459, -10.459};
+  const std::array<double, 6> by{11.5, 11.5, -4.884, -6.616, -6.616, -4.884};
+  for (std::size_t i = 0; i < 6; ++i) {
+    g.base_joints_mm[i] = {ax[i], ay[i], 0};
+    g.platform_joints_mm[i] = {bx[i], by[i], 0};
+    g.actuators[i] = {0, 1, 10, 60};
+  }
+  g.B_from_UG = Rigid3::from_translation({0, 0, 20});
+  ASSERT_EQ(geometry_fault(g), std::nullopt);
+  EXPECT_THAT(leg_lengths(g, g.home_B_from_P()), MatrixNear(LegVector::Constant(29.7466).eval(), 5e-4));
+  const ForwardResult r = forward_kinematics(g, LegVector::Constant(29.7466));
+  ASSERT_EQ(r.status, ForwardStatus::converged) << r.reason;
+  EXPECT_THAT(*r.B_from_P, RigidNear(g.home_B_from_P(), 1e-3, 1e-2));
+}
+
 }  // namespace
 }  // namespace hexcal

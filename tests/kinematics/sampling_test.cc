@@ -55,6 +55,7 @@ TEST(Sampling, LoadPathsMoveWhatTheyName) {
   for (const Pose& pose : sample_poses(g, options).poses) {
     EXPECT_LE(pose.position_mm.z(), 0);  // LG hangs below UG: pulling moves it down
     EXPECT_EQ(pose.rpy_rad.norm(), 0);
+    EXPECT_FALSE(std::signbit(pose.rpy_rad.z())) << "a zero is written without a sign";
   }
   options.load_paths = {LoadPath::torsion, LoadPath::bending_x};
   options.combine = true;

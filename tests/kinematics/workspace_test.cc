@@ -107,6 +107,14 @@ TEST(GeometryFault, NamesWhatNoMachineCanHave) {
                 for (std::size_t i = 0; i < 6; ++i) g.platform_joints_mm[i] = 0.5 * g.base_joints_mm[i];
               }),
               HasSubstr("architecture singularity"));
+  // Also when they are written with three decimals.
+  EXPECT_THAT(fault([](G& g) {
+                for (std::size_t i = 0; i < 6; ++i) {
+                  g.base_joints_mm[i] = 1e-3 * (1e3 * g.base_joints_mm[i]).array().round().matrix();
+                  g.platform_joints_mm[i] = 1e-3 * (500 * g.base_joints_mm[i]).array().round().matrix();
+                }
+              }),
+              HasSubstr("architecture singularity"));
   // A quarter turn at home: singular there only.
   EXPECT_THAT(
       fault([](G& g) {

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -96,6 +97,37 @@ int axis_of(const std::string& text, const Flags& flags) {
       fmt::format("--slice: found '{}', wanted two of x, y, z, roll, pitch, yaw, as in x,z", flags.slice));
 }
 
+// Moves each side of the slice that has reachable cells on its rim outwards by a tenth; false when none has.
+bool widen(const std::vector<SliceCell>& cells, SliceOptions& options) {
+  const auto reachable = [&](int u, int v) {
+    return cells[static_cast<std::size_t>(v) * static_cast<std::size_t>(options.u_count) +
+                 static_cast<std::size_t>(u)]
+               .verdict == PoseVerdict::reachable;
+  };
+  bool left = false;
+  bool right = false;
+  bool bottom = false;
+  bool top = false;
+  for (int v = 0; v < options.v_count; ++v) {
+    left |= reachable(0, v);
+    right |= reachable(options.u_count - 1, v);
+  }
+  for (int u = 0; u < options.u_count; ++u) {
+    bottom |= reachable(u, 0);
+    top |= reachable(u, options.v_count - 1);
+  }
+  const double u_rim = 0.1 * (options.u_high - options.u_low);
+  const double v_rim = 0.1 * (options.v_high - options.v_low);
+  const auto limit = [](int axis) { return axis < 3 ? 1e300 : (axis == 4 ? 85 : 180) * kRadPerDeg; };
+  const SliceOptions before = options;
+  if (left) options.u_low = std::max(options.u_low - u_rim, -limit(options.axis_u));
+  if (right) options.u_high = std::min(options.u_high + u_rim, limit(options.axis_u));
+  if (bottom) options.v_low = std::max(options.v_low - v_rim, -limit(options.axis_v));
+  if (top) options.v_high = std::min(options.v_high + v_rim, limit(options.axis_v));
+  return options.u_low < before.u_low || options.u_high > before.u_high || options.v_low < before.v_low ||
+         options.v_high > before.v_high;
+}
+
 int draw_slice(const Flags& flags, const Machine& machine) {
   const std::size_t comma = flags.slice.find(',');
   SliceOptions options;
@@ -110,7 +142,10 @@ int draw_slice(const Flags& flags, const Machine& machine) {
   options.u_high = box.upper[options.axis_u];
   options.v_low = box.lower[options.axis_v];
   options.v_high = box.upper[options.axis_v];
-  const std::vector<SliceCell> cells = workspace_slice(machine.geometry, options);
+  std::vector<SliceCell> cells = workspace_slice(machine.geometry, options);
+  // The box holds nearly all poses, but a slice may reach farther.
+  for (int round = 0; round < 8 && widen(cells, options); ++round)
+    cells = workspace_slice(machine.geometry, options);
   std::string text = head_of(flags) + kColumns;
   for (const SliceCell& cell : cells) append_cell(text, cell);
   write_file_atomically(flags.out, text);

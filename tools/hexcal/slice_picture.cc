@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <vector>
 
 namespace hexcal {
 namespace {
@@ -11,7 +12,6 @@ namespace {
 constexpr double kLeft = 80;
 constexpr double kTop = 30;
 constexpr double kSide = 480;
-constexpr int kTicks = 5;
 
 // Colours that differ in lightness too.
 const char* colour(PoseVerdict verdict) {
@@ -47,6 +47,19 @@ constexpr std::array kAxes{"x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw
 
 double shown(int axis, double value) { return axis < 3 ? value : value * kDegPerRad; }
 
+// Round numbers in a range, four to ten of them.
+std::vector<double> ticks(double low, double high) {
+  const double span = high - low;
+  if (!(span > 0)) return {low};
+  double step = std::pow(10, std::floor(std::log10(span)));
+  for (const double part : {0.5, 0.4, 0.5}) {
+    if (span / step < 4) step *= part;
+  }
+  std::vector<double> values;
+  for (double n = std::ceil(low / step); n * step <= high; ++n) values.push_back(n * step + 0.0);
+  return values;
+}
+
 }  // namespace
 
 std::string slice_picture(const std::vector<SliceCell>& cells, const SliceOptions& options) {
@@ -57,6 +70,7 @@ std::string slice_picture(const std::vector<SliceCell>& cells, const SliceOption
       "font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n",
       kLeft + kSide + 160, kTop + kSide + 60);
   // One rectangle per run of equal cells in a row.
+  svg += "<g shape-rendering=\"crispEdges\">\n";
   for (int j = 0; j < options.v_count; ++j) {
     const auto verdict = [&](int i) {
       return cells[static_cast<std::size_t>(j) * static_cast<std::size_t>(options.u_count) +
@@ -72,15 +86,40 @@ std::string slice_picture(const std::vector<SliceCell>& cells, const SliceOption
       i = end;
     }
   }
-  for (int n = 0; n <= kTicks; ++n) {
-    const double part = static_cast<double>(n) / kTicks;
-    const double u = shown(options.axis_u, options.u_low + part * (options.u_high - options.u_low));
-    const double v = shown(options.axis_v, options.v_low + part * (options.v_high - options.v_low));
-    svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{:.1f}</text>\n",
-                       kLeft + part * kSide, kTop + kSide + 18, u);
-    svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"end\">{:.1f}</text>\n", kLeft - 6,
-                       kTop + kSide - part * kSide + 4, v);
+  svg += "</g>\n";
+  const double u_low = shown(options.axis_u, options.u_low);
+  const double u_high = shown(options.axis_u, options.u_high);
+  const double v_low = shown(options.axis_v, options.v_low);
+  const double v_high = shown(options.axis_v, options.v_high);
+  const auto across = [&](double u) { return kLeft + (u - u_low) / (u_high - u_low) * kSide; };
+  const auto down = [&](double v) { return kTop + kSide - (v - v_low) / (v_high - v_low) * kSide; };
+  for (const double u : ticks(u_low, u_high)) {
+    svg += fmt::format(
+        "<path d=\"M{0:.1f} {1:.1f}v5\" stroke=\"#000000\"/><text x=\"{0:.1f}\" y=\"{2:.1f}\" "
+        "text-anchor=\"middle\">{3:g}</text>\n",
+        across(u), kTop + kSide, kTop + kSide + 18, u);
   }
+  for (const double v : ticks(v_low, v_high)) {
+    svg += fmt::format(
+        "<path d=\"M{0:.1f} {1:.1f}h-5\" stroke=\"#000000\"/><text x=\"{2:.1f}\" y=\"{3:.1f}\" "
+        "text-anchor=\"end\">{4:g}</text>\n",
+        kLeft, down(v), kLeft - 8, down(v) + 4, v);
+  }
+  if (u_low < 0 && u_high > 0 && v_low < 0 && v_high > 0) {
+    svg += fmt::format(
+        "<path d=\"M{:.1f} {:.1f}m-6 0h12m-6 -6v12\" stroke=\"#000000\" stroke-width=\"1.5\"><title>home"
+        "</title></path>\n",
+        across(0), down(0));
+  }
+  std::string others;
+  const Vector6d centre = options.centre.vector();
+  for (int k = 0; k < 6; ++k) {
+    if (k == options.axis_u || k == options.axis_v) continue;
+    others += fmt::format("{}{} {:g}", others.empty() ? "at " : ", ", kAxes[static_cast<std::size_t>(k)],
+                          shown(k, centre[k]));
+  }
+  svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n", kLeft + kSide / 2,
+                     kTop - 10, others);
   svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n", kLeft + kSide / 2,
                      kTop + kSide + 42, kAxes[static_cast<std::size_t>(options.axis_u)]);
   svg +=
