@@ -21,6 +21,10 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kOutlierSquares = 22.46;
 constexpr double kMedianSquares = 5.348;
 constexpr int kMinPosesForRobust = 10;
+// Share of the residuals' variance below which leg noise is not worth another iteration, and change of a
+// noise or a tolerance (logarithm) that counts as none.
+constexpr double kSmallShare = 0.02;
+constexpr double kSettled = 0.02;
 // How far frames may move in one step where nothing holds them: wider than any knowledge.
 constexpr double kFrameStepMm = 1000;
 constexpr double kFrameStepRad = 1;
@@ -158,7 +162,7 @@ class Identification {
           if (hyper_change_ < 0.05 || in_phase == 10) advance(Phase::tolerances);
           break;
         case Phase::tolerances:
-          if (hyper_change_ < 2e-3 || i > options_.max_iterations - 15) advance(Phase::settled);
+          if (hyper_change_ < kSettled || in_phase == 30) advance(Phase::settled);
           break;
         case Phase::settled:
           if (step_squares_ < 1e-16 * std::max(1.0, rows_)) {
@@ -290,8 +294,8 @@ class Identification {
         scaled_by(noise_.orientation_factor, equations_.orientation.factor(covariance_), 1e-6, 1e6);
       } else if (options_.estimate_leg_sigma) {
         scaled_by(noise_.leg_sigma_mm, equations_.leg.factor(covariance_), 0.01 * options_.leg_sigma_mm, 1e3);
-        // The smallest values differ in nothing.
-        if (noise_.leg_sigma_mm < 0.1 * options_.leg_sigma_mm) hyper_change_ = 0;
+        // Where measuring noise is nearly all there is, the rest differs in nothing.
+        if (equations_.leg.trace < kSmallShare * equations_.rows) hyper_change_ = 0;
       }
     }
     if (!adapt_tolerances_) return;

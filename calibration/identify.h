@@ -39,7 +39,7 @@ struct IdentifyOptions {
   double leg_sigma_mm = 0.001;
   bool estimate_leg_sigma = true;
   bool robust = true;  ///< down-weight poses whose residual does not fit the others
-  int max_iterations = 120;
+  int max_iterations = 80;
 
   /// Throws InputError naming the field, or a parameter that does not exist.
   void validate() const;

@@ -25,13 +25,37 @@ double leg_variance(const LegNoise& noise) {
   return std::max(noise.leg_sigma_mm * noise.leg_sigma_mm, kFloorMm * kFloorMm);
 }
 
+// Sums A^T A over the rows of many poses, which come six at a time: products of tall blocks are several times
+// faster than those of single poses.
+class RowProducts {
+ public:
+  RowProducts(Eigen::MatrixXd& sum, Eigen::Index columns) : sum_(sum) { block_.resize(kRows, columns); }
+
+  void add(const Eigen::MatrixXd& rows) {
+    if (used_ + rows.rows() > kRows) flush();
+    block_.middleRows(used_, rows.rows()) = rows;
+    used_ += rows.rows();
+  }
+
+  void flush() {
+    if (used_ > 0) sum_.selfadjointView<Eigen::Lower>().rankUpdate(block_.topRows(used_).transpose());
+    used_ = 0;
+  }
+
+ private:
+  static constexpr Eigen::Index kRows = 192;
+  Eigen::MatrixXd& sum_;
+  Eigen::MatrixXd block_;
+  Eigen::Index used_ = 0;
+};
+
 // Of whitened quantities; factor * factor^T is the component's covariance.
-void add_component(NormalEquations::Component& component, const Eigen::MatrixXd& factor,
-                   const Eigen::VectorXd& residuals, const Eigen::MatrixXd& jacobian, double weight) {
-  const Eigen::MatrixXd projected = factor.transpose() * jacobian;
+void add_component(NormalEquations::Component& component, RowProducts& information,
+                   const Eigen::MatrixXd& factor, const Eigen::VectorXd& residuals,
+                   const Eigen::MatrixXd& jacobian, double weight) {
   component.quadratic += (factor.transpose() * residuals).squaredNorm();
   component.trace += weight * factor.squaredNorm();
-  component.information.selfadjointView<Eigen::Lower>().rankUpdate(projected.transpose());
+  information.add(factor.transpose() * jacobian);
 }
 
 }  // namespace
@@ -86,6 +110,10 @@ NormalEquations normal_equations(const std::vector<ReducedPose>& reduced, const 
   sums.squares_of_pose.resize(reduced.size());
   const bool joint = observations.joint_covariance.size() > 0;
 
+  RowProducts information(sums.information, parameters);
+  RowProducts leg_information(sums.leg.information, parameters);
+  RowProducts position_information(sums.position.information, parameters);
+  RowProducts orientation_information(sums.orientation.information, parameters);
   Eigen::Index rows = 0;
   Eigen::MatrixXd white;
   for (std::size_t i = 0; i < reduced.size(); ++i) {
@@ -106,20 +134,22 @@ NormalEquations normal_equations(const std::vector<ReducedPose>& reduced, const 
     if (request.information_of_pose)
       sums.information_of_pose.push_back(weights[i] * white.transpose() * white);
     if (joint) continue;
-    sums.information.selfadjointView<Eigen::Lower>().rankUpdate(white.transpose(), weights[i]);
-    sums.gradient.noalias() += weights[i] * white.transpose() * white_residuals;
-    sums.squares += weights[i] * white_residuals.squaredNorm();
+    const SmallVector weighted_residuals = root * white_residuals;
+    white *= root;
+    information.add(white);
+    sums.gradient.noalias() += white.transpose() * weighted_residuals;
+    sums.squares += weighted_residuals.squaredNorm();
     if (!request.components) continue;
-    const auto component_of = [&](NormalEquations::Component& component, const SmallMatrix& factor) {
-      const SmallMatrix white_factor = llt.matrixL().solve(factor);
-      add_component(component, white_factor, root * white_residuals, root * white, weights[i]);
-    };
     if (observations.covariance_known) {
-      component_of(sums.leg, noise.leg_sigma_mm * SmallMatrix::Identity(m, m));
+      const SmallMatrix factor = llt.matrixL().solve(noise.leg_sigma_mm * SmallMatrix::Identity(m, m));
+      add_component(sums.leg, leg_information, factor, weighted_residuals, white, weights[i]);
     } else {
-      const SmallMatrix by_sigma = pose.by_pose * noise_of_pose.diagonal().cwiseSqrt().asDiagonal();
-      component_of(sums.position, by_sigma.leftCols(3));
-      component_of(sums.orientation, by_sigma.rightCols(3));
+      const SmallMatrix factor =
+          llt.matrixL().solve(SmallMatrix(pose.by_pose * noise_of_pose.diagonal().cwiseSqrt().asDiagonal()));
+      add_component(sums.position, position_information, factor.leftCols(3), weighted_residuals, white,
+                    weights[i]);
+      add_component(sums.orientation, orientation_information, factor.rightCols(3), weighted_residuals, white,
+                    weights[i]);
     }
   }
   if (joint) {
@@ -150,9 +180,14 @@ NormalEquations normal_equations(const std::vector<ReducedPose>& reduced, const 
     if (request.components) {
       const Eigen::MatrixXd factor =
           llt.matrixL().solve(noise.leg_sigma_mm * Eigen::MatrixXd::Identity(rows, rows));
-      add_component(sums.leg, factor, residuals, jacobian, mean_weight);
+      sums.leg.quadratic = (factor.transpose() * residuals).squaredNorm();
+      sums.leg.trace = mean_weight * factor.squaredNorm();
+      sums.leg.information.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose() * factor);
     }
   }
+  for (RowProducts* products :
+       {&information, &leg_information, &position_information, &orientation_information})
+    products->flush();
   const Eigen::MatrixXd lower = sums.information;
   sums.information = lower.selfadjointView<Eigen::Lower>();
   return sums;
