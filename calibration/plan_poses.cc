@@ -7,11 +7,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include "calibration/leg_residuals.h"
 #include "calibration/normal_equations.h"
 #include "kinematics/geometry/input_error.h"
 #include "kinematics/inverse.h"
+#include "kinematics/sampling.h"
 
 namespace hexcal {
 namespace {
@@ -117,6 +119,52 @@ class Criterion {
   const Eigen::MatrixXd& interest_;
 };
 
+// The candidates that would help most beside those chosen.
+std::vector<std::size_t> shortlist(const std::vector<Whitened>& measured, const Criterion& criterion,
+                                   const Eigen::MatrixXd& covariance) {
+  constexpr std::size_t kShortlisted = 150;
+  const Eigen::MatrixXd weighted = criterion.weighted(covariance);
+  std::vector<std::pair<double, std::size_t>> by_gain;
+  for (std::size_t i = 0; i < measured.size(); ++i)
+    by_gain.emplace_back(-criterion.gain(covariance, weighted, measured[i], 1.0), i);
+  std::sort(by_gain.begin(), by_gain.end());
+  std::vector<std::size_t> best;
+  for (std::size_t k = 0; k < std::min(kShortlisted, by_gain.size()); ++k) best.push_back(by_gain[k].second);
+  return best;
+}
+
+// Each pose in turn goes, and the one that then helps most comes, until a whole round changes nothing. Of the
+// candidates the most helpful ones are looked at, anew in each round.
+void exchange(PosePlan& plan, const std::vector<Whitened>& measured, const Criterion& criterion,
+              int max_exchanges, Eigen::Index parameters) {
+  bool changed = true;
+  while (changed && plan.exchanges < max_exchanges) {
+    changed = false;
+    const std::vector<std::size_t> best =
+        shortlist(measured, criterion, covariance_of(measured, plan.chosen, parameters));
+    for (std::size_t k = 0; k < plan.chosen.size(); ++k) {
+      std::vector<std::size_t> others = plan.chosen;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+      const Eigen::MatrixXd covariance = covariance_of(measured, others, parameters);
+      const Eigen::MatrixXd weighted = criterion.weighted(covariance);
+      std::size_t next = plan.chosen[k];
+      double most = criterion.gain(covariance, weighted, measured[next], 1.0);
+      most += 1e-6 * std::abs(most);
+      for (const std::size_t i : best) {
+        if (std::find(plan.chosen.begin(), plan.chosen.end(), i) != plan.chosen.end()) continue;
+        const double gain = criterion.gain(covariance, weighted, measured[i], 1.0);
+        if (gain <= most) continue;
+        most = gain;
+        next = i;
+      }
+      if (next == plan.chosen[k]) continue;
+      plan.chosen[k] = next;
+      ++plan.exchanges;
+      changed = true;
+    }
+  }
+}
+
 PredictedError predict(const std::vector<Whitened>& errors, const Eigen::MatrixXd& covariance,
                        std::size_t poses) {
   PredictedError predicted;
@@ -142,6 +190,32 @@ void PlanOptions::validate() const {
   positive(position_sigma_mm, "position_sigma_mm");
   positive(orientation_sigma_deg, "orientation_sigma_deg");
   identify.validate();
+}
+
+std::vector<Pose> planning_candidates(const PlatformGeometry& nominal, std::size_t count, std::uint64_t seed,
+                                      double max_tilt_rad) {
+  // Not quite to the limit: the real machine is not the drawing.
+  constexpr double kShareOfWay = 0.85;
+  const RestState rest(nominal);
+  const PoseBox box = workspace_box(nominal);
+  const Vector6d half = 0.5 * (box.upper - box.lower);
+  std::mt19937_64 rng(seed);
+  const auto centred = [&rng] { return static_cast<double>(rng()) * 0x1p-63 - 1; };
+  const auto tilt_rad = [](const Pose& pose) {
+    const Eigen::Vector3d z = quaternion_from_rpy(pose.rpy_rad) * Eigen::Vector3d::UnitZ();
+    return std::atan2(z.head<2>().norm(), z.z());
+  };
+  std::vector<Pose> poses;
+  for (std::size_t attempt = 0; attempt < 20 * count && poses.size() < count; ++attempt) {
+    Vector6d direction;
+    for (Eigen::Index k = 0; k < 6; ++k) direction[k] = half[k] * centred();
+    const double reach = reach_along(nominal, rest, Pose{}, direction, 5.0, {}, 16);
+    Pose pose = Pose::from_vector(kShareOfWay * reach * direction);
+    for (int shrink = 0; shrink < 8 && tilt_rad(pose) > max_tilt_rad; ++shrink)
+      pose = Pose::from_vector(0.8 * pose.vector());
+    if (reach > 0 && tilt_rad(pose) <= max_tilt_rad) poses.push_back(pose);
+  }
+  return poses;
 }
 
 PosePlan plan_poses(const PlatformGeometry& nominal, const std::vector<Pose>& candidates,
@@ -188,30 +262,7 @@ PosePlan plan_poses(const PlatformGeometry& nominal, const std::vector<Pose>& ca
     plan.chosen.push_back(best_addition(plan.chosen).first);
     covariance = covariance_of(measured, plan.chosen, design.parameters());
   }
-  // Exchange: the pose that is missed least goes, the one that helps most comes.
-  for (plan.exchanges = 0; plan.exchanges < options.max_exchanges; ++plan.exchanges) {
-    const Eigen::MatrixXd weighted = criterion.weighted(covariance);
-    std::size_t least = 0;
-    double loss = -std::numeric_limits<double>::infinity();
-    for (std::size_t k = 0; k < plan.chosen.size(); ++k) {
-      const double change = criterion.gain(covariance, weighted, measured[plan.chosen[k]], -1.0);
-      if (change > loss) {
-        loss = change;
-        least = k;
-      }
-    }
-    std::vector<std::size_t> others = plan.chosen;
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(least));
-    covariance = covariance_of(measured, others, design.parameters());
-    const auto [best, gain] = best_addition(others);
-    const bool same = best == plan.chosen[least] || gain + loss <= 1e-9 * std::abs(gain);
-    if (!same) {
-      others.push_back(best);
-      plan.chosen = others;
-    }
-    covariance = covariance_of(measured, plan.chosen, design.parameters());
-    if (same) break;
-  }
+  exchange(plan, measured, criterion, options.max_exchanges, design.parameters());
   // In the order in which they help, so that one may stop early.
   std::vector<std::size_t> pool = plan.chosen;
   plan.chosen.clear();

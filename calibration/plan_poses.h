@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -14,7 +15,7 @@ enum class PlanCriterion {
 
 struct PlanOptions {
   std::size_t count = 12;
-  PlanCriterion criterion = PlanCriterion::d_optimal;
+  PlanCriterion criterion = PlanCriterion::i_optimal;
   IdentifyOptions identify;  ///< which parameters will be identified, with which tolerances
   double position_sigma_mm = 0.05;
   double orientation_sigma_deg = 0.02;
@@ -37,6 +38,12 @@ struct PosePlan {
   std::vector<PredictedError> random_by_count;  ///< the same for candidates as they come, for comparison
   int exchanges = 0;
 };
+
+/// Poses to choose from: ends of random ways from home, most of the way to the limits of strokes, joints and
+/// singularity. Far poses say most about a machine: 12 chosen of them do what 34 random ones of a smaller
+/// working range do. Only poses whose tilt is at most `max_tilt_rad`.
+[[nodiscard]] std::vector<Pose> planning_candidates(const PlatformGeometry& nominal, std::size_t count,
+                                                    std::uint64_t seed, double max_tilt_rad = 4);
 
 /// Chooses poses to measure from candidates: greedy choice, then exchange of single poses while the criterion
 /// improves (Fedorov 1972; DETMAX of Mitchell, Technometrics 16 (1974) 203). The tolerances count as prior

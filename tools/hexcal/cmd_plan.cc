@@ -21,12 +21,12 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Flags {
-  fs::path campaign, hexapod, candidates, load_paths, out;
+  fs::path campaign, hexapod, targets, candidates, load_paths, out;
   std::size_t count = 12;
-  std::string criterion = "d";
+  std::string criterion = "i";
   double position_sigma_mm = 0.05;
   double orientation_sigma_deg = 0.02;
-  double max_tilt_deg = 180;
+  double max_tilt_deg = 60;
   std::uint64_t seed = 1;
   bool json = false;
 };
@@ -52,6 +52,7 @@ int run(Flags flags) {
   if (!flags.campaign.empty()) {
     const Campaign campaign = read_campaign(flags.campaign);
     if (flags.hexapod.empty() && campaign.hexapod) flags.hexapod = *campaign.hexapod;
+    if (campaign.targets && fs::exists(*campaign.targets)) flags.targets = *campaign.targets;
   }
   if (flags.hexapod.empty())
     throw InputError("--hexapod: missing, wanted hexapod.yaml or a campaign that names it");
@@ -60,10 +61,7 @@ int run(Flags flags) {
   std::vector<std::string> ids;
   std::vector<Pose> candidates;
   if (flags.candidates.empty()) {
-    SampleOptions sampling;
-    sampling.count = kCandidates;
-    sampling.seed = flags.seed;
-    candidates = sample_poses(nominal, sampling).poses;
+    candidates = planning_candidates(nominal, kCandidates, flags.seed, flags.max_tilt_deg * kRadPerDeg);
   } else {
     candidates = poses_of(flags.candidates, &ids);
   }
@@ -75,15 +73,21 @@ int run(Flags flags) {
   std::vector<Pose> load_paths;
   if (!flags.load_paths.empty()) {
     load_paths = poses_of(flags.load_paths);
-  } else if (flags.criterion == "i") {
+  } else if (flags.criterion == "load") {
     SampleOptions sampling;
     sampling.count = 100;
     sampling.kind = SampleKind::load_paths;
     load_paths = sample_poses(nominal, sampling).poses;
+  } else if (!flags.targets.empty()) {
+    load_paths = poses_of(flags.targets);
+  } else {
+    SampleOptions sampling;
+    sampling.count = 200;
+    load_paths = sample_poses(nominal, sampling).poses;
   }
   PlanOptions options;
   options.count = flags.count;
-  options.criterion = flags.criterion == "i" ? PlanCriterion::i_optimal : PlanCriterion::d_optimal;
+  options.criterion = flags.criterion == "d" ? PlanCriterion::d_optimal : PlanCriterion::i_optimal;
   options.position_sigma_mm = flags.position_sigma_mm;
   options.orientation_sigma_deg = flags.orientation_sigma_deg;
   const PosePlan plan = plan_poses(nominal, candidates, load_paths, options);
@@ -98,6 +102,7 @@ int run(Flags flags) {
   std::vector<fs::path> inputs{flags.hexapod};
   if (!flags.candidates.empty()) inputs.push_back(flags.candidates);
   if (!flags.load_paths.empty()) inputs.push_back(flags.load_paths);
+  if (!flags.targets.empty()) inputs.push_back(flags.targets);
   write_file_atomically(
       flags.out, format_pose_table(provenance_line(kVersion, "plan", inputs), records, PoseColumns::target));
   if (flags.json) {
@@ -137,11 +142,13 @@ void add_plan_command(CLI::App& app, Action& action) {
   command->add_option("--hexapod", flags->hexapod, "nominal geometry (hexapod.yaml)");
   command->add_option("-n,--poses", flags->count, "number of poses")->capture_default_str();
   command
-      ->add_option("--criterion", flags->criterion, "d: best parameters; i: least error along the load paths")
-      ->check(CLI::IsMember({"d", "i"}))
+      ->add_option(
+          "--criterion", flags->criterion,
+          "i: least error at the --load-paths, else the campaign's targets, else over the workspace; "
+          "load: along tension, compression, torsion, bending; d: best parameters")
+      ->check(CLI::IsMember({"i", "load", "d"}))
       ->capture_default_str();
-  command->add_option("--load-paths", flags->load_paths,
-                      "poses at which the error matters (default: tension, compression, torsion, bending)");
+  command->add_option("--load-paths", flags->load_paths, "poses at which the error matters");
   command->add_option("--candidates", flags->candidates, "choose among these poses instead of the workspace");
   command
       ->add_option("--max-tilt-deg", flags->max_tilt_deg,
