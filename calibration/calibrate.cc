@@ -12,6 +12,7 @@ namespace hexcal {
 namespace {
 
 constexpr std::size_t kFewestPoses = 4;
+constexpr double kLeastTiltDeg = 0.5;
 
 bool kinematic_family(const CrossValidation& method) {
   return method.method == CompensationMethod::kinematic;
@@ -94,6 +95,7 @@ std::vector<PaperEvaluation> evaluate_methods(const ObservationSet& observations
 void require_poses(const ObservationSet& observations) {
   std::size_t count = 0;
   double spread = 0;
+  bool targets = false;
   for (const PoseObservation& pose : observations.poses) {
     if (pose.is_definition) continue;
     ++count;
@@ -105,6 +107,19 @@ void require_poses(const ObservationSet& observations) {
                     "ones may do)",
                     count, kFewestPoses));
   if (spread == 0) throw InputError("all measured poses have the same readings, wanted different poses");
+  // Level poses determine 24 of 42 numbers, and none of what tilts the platform.
+  double tilt_rad = 0;
+  for (const PoseObservation& pose : observations.poses) {
+    if (pose.is_definition || !pose.target) continue;
+    const Eigen::Vector3d z = quaternion_from_rpy(pose.target->rpy_rad) * Eigen::Vector3d::UnitZ();
+    tilt_rad = std::max(tilt_rad, std::atan2(z.head<2>().norm(), z.z()));
+    targets = true;
+  }
+  if (targets && tilt_rad < kLeastTiltDeg * kRadPerDeg)
+    throw InputError(
+        fmt::format("all poses are level (tilted by at most {:.2f} deg), wanted some tilted about x and y by "
+                    "several degrees",
+                    tilt_rad * kDegPerRad));
 }
 
 }  // namespace

@@ -46,7 +46,7 @@ struct CalibrationReport {
 
 /// From observations to a model: outliers out, all methods side by side by cross-validation, the wanted or
 /// the best one fitted to everything. Throws InputError when the poses cannot carry any model (fewer than 4,
-/// all at one place) or the wanted one.
+/// all at one place, all level) or the wanted one.
 [[nodiscard]] CalibrationReport calibrate(const PlatformGeometry& nominal, const ObservationSet& observations,
                                           const CalibrateOptions& options = {});
 

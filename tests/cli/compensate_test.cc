@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <fstream>
+#include <random>
 
+#include "calibration/statistics.h"
 #include "tests/support/run_hexcal.h"
+#include "tools/io/pose_table.h"
 
 namespace hexcal {
 namespace {
@@ -88,8 +91,65 @@ TEST_F(Compensate, RefusesInOneClearLine) {
   refused(good + "p3,1,2,3,4,5,6\n", targets, "pose 'p3' stands twice");
   refused(table(1, 0.2, 0.001), targets, "metres?");
   refused(good + "q,nan,2,3,4,5,6\n", targets, "x_mm");
+  std::string level = kHead;
+  for (int i = 0; i < 10; ++i) level += fmt::format("p{},{},{},{},0,0,0\n", i, 3 * i - 12, (7 * i) % 10, i);
+  refused(level, level, "all poses are level");
   refused(good, fmt::format("{}z,0,0,0,0,0,0\n", kHead), "no pose has a target");
   refused(good + "far,0,0,300,0,0,0\n", targets + "far,0,0,300,0,0,0\n", "wanted 380 to 580 mm");
+}
+
+// Round 2: the hidden machine goes to the corrected commands, is measured again, and the model is refined.
+TEST_F(Compensate, PosesMeasuredAfterCompensationRefineTheModel) {
+  const std::filesystem::path lab = folder_.path() / "lab";
+  const std::filesystem::path out = folder_.path() / "out";
+  const std::string targets = (lab / "targets.csv").string();
+  const auto done = [](const std::vector<std::string>& arguments) {
+    const CommandResult r = run_hexcal(arguments);
+    EXPECT_LE(r.exit_code, 1) << r.err;
+  };
+  std::mt19937_64 rng(1);
+  // The truth with 0.1 mm and 0.03 deg of noise.
+  const auto measure = [&](const std::filesystem::path& truth) {
+    std::normal_distribution<double> normal;
+    std::vector<PoseRecord> records = read_pose_table(truth / "truth/poses.csv");
+    for (PoseRecord& record : records) {
+      for (Eigen::Index k = 0; k < 3; ++k) {
+        record.pose->position_mm[k] += 0.1 * normal(rng);
+        record.pose->rpy_rad[k] += 0.03 * kRadPerDeg * normal(rng);
+      }
+    }
+    return format_pose_table("", records, PoseColumns::target);
+  };
+  const auto rms_mm = [&](const std::filesystem::path& truth) {
+    std::vector<PosePair> pairs;
+    const std::vector<PoseRecord> wanted = read_pose_table(targets);
+    const std::vector<PoseRecord> reached = read_pose_table(truth / "truth/poses.csv");
+    for (std::size_t i = 0; i < std::min(wanted.size(), reached.size()); ++i)
+      if (reached[i].pose) pairs.push_back({*wanted[i].pose, *reached[i].pose});
+    return error_statistics(pairs).position_rms_mm;
+  };
+  const auto compensate_round = [&](const char* round) {
+    done({"compensate", "--hexapod", (lab / "hexapod.yaml").string(), "--targets", targets, "--poses",
+          (folder_.path() / "poses.csv").string(), "--sigma-mm", "0.1", "--sigma-deg", "0.03", "--round",
+          round, "-o", out.string()});
+  };
+  const auto move_to = [&](const std::filesystem::path& commands, const std::filesystem::path& to) {
+    done({"simulate", "-o", to.string(), "--from", lab.string(), "--commands", commands.string(),
+          "--photos-per-pose", "0"});
+  };
+  done({"simulate", "-o", lab.string(), "--seed", "5", "--poses", "20", "--photos-per-pose", "0",
+        "--calibration-photos", "0"});
+  write("poses.csv", measure(lab));
+  compensate_round("1");
+  move_to(out / "actuators.csv", folder_.path() / "lab2");
+  std::filesystem::create_directories(out / "round2");
+  write("out/round2/poses.csv", measure(folder_.path() / "lab2"));
+  compensate_round("2");
+  move_to(out / "round2/actuators.csv", folder_.path() / "lab3");
+  const double first = rms_mm(folder_.path() / "lab2");
+  const double second = rms_mm(folder_.path() / "lab3");
+  EXPECT_LT(first, 0.03 * rms_mm(lab));
+  EXPECT_LT(second, 0.9 * first);
 }
 
 }  // namespace
