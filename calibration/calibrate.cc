@@ -23,7 +23,7 @@ std::size_t choose_within(const MethodComparison& comparison, const std::string&
   const auto& methods = comparison.methods;
   std::size_t chosen = methods.size();
   for (std::size_t i = 0; i < methods.size(); ++i) {
-    const bool exact = methods[i].name == wanted;
+    const bool exact = methods[i].name == (wanted == "geometry" ? "kinematic" : wanted);
     const bool extension = wanted == "kinematic" && methods[i].name.rfind("kinematic +", 0) == 0;
     if (!(exact || extension) || !methods[i].failure.empty()) continue;
     if (chosen == methods.size()) {
@@ -168,7 +168,7 @@ CalibrationReport calibrate(const PlatformGeometry& nominal, const ObservationSe
     chosen = choose_within(report.comparison, options.method);
     if (chosen == candidates.size())
       throw InputError(fmt::format("method {}: cannot be fitted to these poses", options.method));
-    report.why = candidates[chosen].name == options.method
+    report.why = candidates[chosen].name == options.method || options.method == "geometry"
                      ? fmt::format("{}: as asked", options.method)
                      : fmt::format("{}: as asked, and cross-validation says that the extension helps",
                                    candidates[chosen].name);

@@ -10,8 +10,8 @@
 namespace hexcal {
 
 struct CalibrateOptions {
-  /// "auto", "option1", "option2", "option3", "kinematic" (extensions by cross-validation) or the exact name
-  /// of a candidate.
+  /// "auto", "option1", "option2", "option3", "kinematic" (extensions by cross-validation), "geometry"
+  /// (without them) or the exact name of a candidate.
   std::string method = "auto";
   IdentifyOptions identify;
   ComparisonOptions comparison;

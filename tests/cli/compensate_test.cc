@@ -98,6 +98,30 @@ TEST_F(Compensate, RefusesInOneClearLine) {
   refused(good + "far,0,0,300,0,0,0\n", targets + "far,0,0,300,0,0,0\n", "wanted 380 to 580 mm");
 }
 
+TEST_F(Compensate, ResultsGoToControllers) {
+  (void)run(table(1.5, 0.3), table(0, 0));
+  const auto in = [&](const char* name) { return (folder_.path() / "out" / name).string(); };
+  const std::string written = (folder_.path() / "written").string();
+  const auto exported = [&](const char* name, const char* format) {
+    return run_hexcal({"export", in(name), "--to", format, "-o", written});
+  };
+  CommandResult r = exported("predicted_poses.csv", "pi-gcs");
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.out, HasSubstr("poses can be reached"));
+  r = exported("actuators.csv", "csv");
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  r = exported("actuators.csv", "linuxcnc");
+  EXPECT_EQ(r.exit_code, 2);
+  EXPECT_THAT(r.err, HasSubstr("wanted csv"));
+  (void)run_hexcal({"compensate", "--hexapod", (folder_.path() / "hexapod.yaml").string(), "--targets",
+                    (folder_.path() / "targets.csv").string(), "--poses",
+                    (folder_.path() / "poses.csv").string(), "--method", "geometry", "-o",
+                    (folder_.path() / "out").string()});
+  r = exported("model.yaml", "linuxcnc");
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.out, HasSubstr("genhexkins, re-read"));
+}
+
 // Round 2: the hidden machine goes to the corrected commands, is measured again, and the model is refined.
 TEST_F(Compensate, PosesMeasuredAfterCompensationRefineTheModel) {
   const std::filesystem::path lab = folder_.path() / "lab";

@@ -189,8 +189,10 @@ void add_compensate_command(CLI::App& app, Action& action) {
   command->add_option("--apply", flags->apply, "other targets to correct (default: the same)");
   command->add_option("-o,--out", flags->out, "folder for the results");
   command
-      ->add_option("--method", flags->method,
-                   "auto, option1, option2, option3, kinematic, or a name from the printed table")
+      ->add_option(
+          "--method", flags->method,
+          "auto, option1, option2, option3, kinematic, geometry (kinematic without curves, sag or backlash), "
+          "or a name from the printed table")
       ->capture_default_str();
   command
       ->add_option("--frames", flags->frames,

@@ -25,7 +25,8 @@ std::string linuxcnc_text(const std::string& head, const CalibrationModel& model
   }
   if (model.machine.has_extensions() || !model.machine.backlash_mm.isZero(0))
     throw InputError(
-        "model: genhexkins has no stroke curves, sag or backlash, wanted a plain kinematic model");
+        "model: genhexkins has no stroke curves, sag or backlash, wanted a plain kinematic model (compensate "
+        "--method geometry)");
   const PlatformGeometry& geometry = model.machine.geometry;
   std::string text = head;
   const auto points = [&](const char* pin, const std::array<Eigen::Vector3d, 6>& all) {
