@@ -81,7 +81,7 @@ class PredictedSheet {
   SheetGeometry geometry_;
 };
 
-void measure_saddles(const cv::Mat& grey, const PredictedSheet& predicted, int sheet,
+void measure_saddles(const cv::Mat& grey, ToneCurve tone, const PredictedSheet& predicted, int sheet,
                      const Sheet& description, std::vector<FeatureObservation>& out) {
   const int first = predicted.first_saddle();
   const int count = static_cast<int>(predicted.geometry().saddles.size());
@@ -96,7 +96,7 @@ void measure_saddles(const cv::Mat& grey, const PredictedSheet& predicted, int s
     if (!px || !(x || x_back) || !(y || y_back)) continue;
     const Eigen::Vector2d to_x = x ? *x - *px : *px - *x_back;
     const Eigen::Vector2d to_y = y ? *y - *px : *px - *y_back;
-    out.push_back(from_point(measure_saddle(grey, *px, to_x, to_y), sheet, first + i));
+    out.push_back(from_point(measure_saddle(grey, tone, *px, to_x, to_y), sheet, first + i));
   }
 }
 
@@ -121,7 +121,8 @@ bool has_saddles_or_dots(const Sheet& sheet) {
   return sheet.kind == SheetKind::charuco || sheet.kind == SheetKind::dots;
 }
 
-void detect_chessboard(const cv::Mat& grey, const Sheet& sheet, int index, SheetDetection& out) {
+void detect_chessboard(const cv::Mat& grey, ToneCurve tone, const Sheet& sheet, int index,
+                       SheetDetection& out) {
   const std::vector<Eigen::Vector2d> corners = find_chessboard(grey, sheet);
   if (corners.empty()) {
     out.reason = "the whole chessboard was not found";
@@ -137,7 +138,7 @@ void detect_chessboard(const cv::Mat& grey, const Sheet& sheet, int index, Sheet
       const Eigen::Vector2d at = corner(c, r);
       const Eigen::Vector2d to_x = c + 1 < columns ? corner(c + 1, r) - at : at - corner(c - 1, r);
       const Eigen::Vector2d to_y = r + 1 < rows ? corner(c, r + 1) - at : at - corner(c, r - 1);
-      out.features.push_back(from_point(measure_saddle(grey, at, to_x, to_y), index, r * columns + c));
+      out.features.push_back(from_point(measure_saddle(grey, tone, at, to_x, to_y), index, r * columns + c));
     }
   }
 }
@@ -196,7 +197,8 @@ void detect_family(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>
 }
 
 // Saddles of charucos and dots at the places that the sheet's own markers predict.
-void add_predicted(const cv::Mat& grey, const std::vector<Sheet>& sheets, SheetDetection& out) {
+void add_predicted(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>& sheets,
+                   SheetDetection& out) {
   SheetPhotograph alone;
   alone.features = out.features;
   const CalibrationState start = initial_state(sheets, {alone}, grey.cols, grey.rows, std::nullopt);
@@ -207,7 +209,7 @@ void add_predicted(const cv::Mat& grey, const std::vector<Sheet>& sheets, SheetD
     const Sheet& sheet = sheets[static_cast<std::size_t>(view.sheet)];
     if (!has_saddles_or_dots(sheet)) continue;
     const PredictedSheet predicted(sheet, {}, fit.adjustment.state.camera, view.camera_from_sheet);
-    measure_saddles(grey, predicted, view.sheet, sheet, out.features);
+    measure_saddles(grey, tone, predicted, view.sheet, sheet, out.features);
     measure_dots(grey, predicted, view.sheet, out.features);
   }
 }
@@ -250,7 +252,8 @@ SheetDetection detect_sheets(const cv::Mat& grey, ToneCurve tone, const std::vec
   SheetDetection out;
   std::set<std::string> families;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
-    if (sheets[s].kind == SheetKind::chessboard) detect_chessboard(grey, sheets[s], static_cast<int>(s), out);
+    if (sheets[s].kind == SheetKind::chessboard)
+      detect_chessboard(grey, tone, sheets[s], static_cast<int>(s), out);
     if (sheets[s].kind == SheetKind::photomodeler) {
       detect_ringed_dots(grey, sheets[s], static_cast<int>(s), out);
     }
@@ -258,7 +261,7 @@ SheetDetection detect_sheets(const cv::Mat& grey, ToneCurve tone, const std::vec
   }
   for (const std::string& family : families) detect_family(grey, tone, sheets, family, out);
   sort_features(out.features);
-  if (std::any_of(sheets.begin(), sheets.end(), has_saddles_or_dots)) add_predicted(grey, sheets, out);
+  if (std::any_of(sheets.begin(), sheets.end(), has_saddles_or_dots)) add_predicted(grey, tone, sheets, out);
   prefer_saddles(sheets, out.features);
   sort_features(out.features);
   if (std::none_of(out.features.begin(), out.features.end(), usable) && out.reason.empty()) {
@@ -293,7 +296,7 @@ std::vector<FeatureObservation> refine_sheets(const cv::Mat& grey, ToneCurve ton
     for (auto& feature : measured) {
       if (feature) out.push_back(std::move(*feature));
     }
-    measure_saddles(grey, predicted, view.sheet, sheet, out);
+    measure_saddles(grey, tone, predicted, view.sheet, sheet, out);
     measure_dots(grey, predicted, view.sheet, out);
   }
   prefer_saddles(sheets, out);

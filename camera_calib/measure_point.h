@@ -7,15 +7,16 @@
 
 namespace hexcal {
 
-/// A chessboard's inner corner near `approximate_px`, by the gradients around it (Forstner & Gulch 1987), in
-/// a window of 45 % of the way to the neighbours at `to_x_px` and `to_y_px`, at most 12 px. The covariance is
-/// a guess; the calibration estimates the noise itself.
-[[nodiscard]] PointObservation measure_saddle(const cv::Mat& grey, const Eigen::Vector2d& approximate_px,
+/// A chessboard's inner corner near `approximate_px` by the photometric fit of refine_saddle(); where clipped
+/// or processed pixels defeat it, by the gradients around it. The covariance is then a guess; the calibration
+/// estimates the noise itself.
+[[nodiscard]] PointObservation measure_saddle(const cv::Mat& grey, ToneCurve tone,
+                                              const Eigen::Vector2d& approximate_px,
                                               const Eigen::Vector2d& to_x_px, const Eigen::Vector2d& to_y_px);
 
 /// A dot's centre by the centroid of its darkness, moved from the centroid of the circle's image to the image
-/// of its centre (the eccentricity; Luhmann 2014). `image_from_plane` near the dot; centre and radius in the
-/// plane.
+/// of its centre (the eccentricity; Luhmann 2014): unlike a fit of its edge it does not need the dot's true
+/// diameter. `image_from_plane` near the dot; centre and radius in the plane.
 [[nodiscard]] PointObservation measure_dot(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
                                            const Eigen::Vector2d& centre_in_plane, double radius);
 

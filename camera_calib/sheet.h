@@ -8,17 +8,18 @@
 
 namespace hexcal {
 
-/// Kinds of printed calibration sheets. All are grids of `columns` x `rows` cells, read row by row from the
-/// printed top left:
-///   aprilgrid     square markers with a white gap (`tag_spacing_mm`) between them
-///   chessboard    squares, the top-left one black; measured points are the inner corners
-///   charuco       a chessboard with a marker in every white square; the top-left square is black unless
-///                 `top_left_white` (OpenCV's older boards with an even number of rows)
-///   dots          black dots at a pitch, some replaced by markers so that any part of the sheet is
-///   identified markers       markers to be cut out and glued on; as a template it counts like an aprilgrid
-///   with listed ids photomodeler  PhotoModeler's sheet: dots at a pitch, four of them ringed (4 and 3 arcs
-///   at the top, 2 and 1 at the bottom)
-enum class SheetKind { aprilgrid, chessboard, charuco, dots, markers, photomodeler };
+/// Kinds of printed calibration sheets: grids of `columns` x `rows` cells, read row by row from the printed
+/// top left.
+enum class SheetKind {
+  aprilgrid,   ///< square markers with a white gap (`spacing_mm`) between them
+  chessboard,  ///< squares, the top-left one black; measured points are the inner corners
+  charuco,     ///< a chessboard with a marker in every white square; the top-left square is black unless
+               ///< `top_left_white` (OpenCV's older boards with an even number of rows)
+  dots,     ///< black dots at a pitch, some replaced by markers so that any part of the sheet is identified
+  markers,  ///< to be cut out and glued on; as a template it counts like an aprilgrid with listed ids
+  photomodeler,  ///< PhotoModeler's sheet: dots at a pitch, four of them ringed (4 and 3 arcs at the top, 2
+                 ///< and 1 at the bottom)
+};
 
 [[nodiscard]] std::string_view sheet_kind_name(SheetKind kind);
 [[nodiscard]] std::optional<SheetKind> sheet_kind_from_name(std::string_view name);

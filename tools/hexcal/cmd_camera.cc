@@ -41,10 +41,7 @@ struct Flags {
   bool json = false;
 };
 
-constexpr const char* kSynopsis =
-    R"(Calibrate a camera at one zoom setting from 10 to 20 photographs of a printed sheet.
-
-  hexcal camera photographs/ --template sheet.yaml -o camera.yaml
+constexpr const char* kFooter = R"(  hexcal camera photographs/ --template sheet.yaml -o camera.yaml
 
   photograph     points  rejected  rms_px  tilt_deg  distance_mm  blur_px  status
   DSC_0001.JPG      164         0   0.011      31.2        912.4     0.71  ok
@@ -209,7 +206,9 @@ int run(const Flags& flags) {
 
 void add_camera_command(CLI::App& app, Action& action) {
   auto flags = std::make_shared<Flags>();
-  CLI::App* command = app.add_subcommand("camera", kSynopsis);
+  CLI::App* command = app.add_subcommand(
+      "camera", "Calibrate a camera at one zoom setting from 10 to 20 photographs of a printed sheet.");
+  command->footer(kFooter);
   command->add_option("IMAGES", flags->images, "photographs, or folders of them");
   command->add_option("--template", flags->templates, "sheet.yaml of the printed sheet; may be repeated");
   command->add_option("-o,--output", flags->output, "camera file to write");

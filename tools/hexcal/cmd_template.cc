@@ -30,9 +30,8 @@ struct Flags {
   double marker_mm = 0, gap_mm = 0, square_mm = 0, pitch_mm = 0, dot_mm = 0;
 };
 
-constexpr const char* kSynopsis = R"(Draw a calibration sheet or markers as a vector PDF, true to scale.
-
-  hexcal template aprilgrid --marker-mm 20 --gap-mm 7 --paper A3 --landscape -o sheet.pdf
+constexpr const char* kFooter =
+    R"(  hexcal template aprilgrid --marker-mm 20 --gap-mm 7 --paper A3 --landscape -o sheet.pdf
   hexcal template chessboard --square-mm 20 --columns 12 --rows 8 -o board.pdf
   hexcal template charuco --square-mm 22 --marker-mm 16 -o charuco.pdf
   hexcal template dots --pitch-mm 15 --dot-mm 6 --marker-mm 13 -o dots.pdf
@@ -158,7 +157,9 @@ int run(const Flags& flags) {
 
 void add_template_command(CLI::App& app, Action& action) {
   auto flags = std::make_shared<Flags>();
-  CLI::App* command = app.add_subcommand("template", kSynopsis);
+  CLI::App* command =
+      app.add_subcommand("template", "Draw a calibration sheet or markers as a vector PDF, true to scale.");
+  command->footer(kFooter);
   command->add_option("KIND", flags->kind, fmt::format("one of {}", fmt::join(sheet_kind_names(), ", ")))
       ->required()
       ->check(CLI::IsMember(sheet_kind_names()));
