@@ -22,6 +22,7 @@
 #include "tools/io/camera_file.h"
 #include "tools/io/sheet_file.h"
 #include "tools/io/template_pdf.h"
+#include "tools/report/camera_page.h"
 
 namespace hexcal {
 namespace {
@@ -34,6 +35,7 @@ struct Flags {
   fs::path output;
   fs::path library;
   fs::path poses;
+  fs::path report;
   std::vector<fs::path> compare;
   std::string ruler;
   std::string lens;
@@ -190,6 +192,11 @@ int run(const Flags& flags) {
   const bool done = calibration.status == CalibrationStatus::ok;
   std::vector<std::string> written;
   if (done) written = write_files(flags, sheets, measured, report);
+  if (!flags.report.empty()) {
+    write_file_atomically(flags.report, render_camera_page(sheets, calibration, flags.output.string(),
+                                                           measured.setting, report));
+    written.push_back(flags.report.string());
+  }
   if (flags.json) {
     fmt::print("{}\n", camera_json(calibration, report));
   } else {
@@ -215,6 +222,8 @@ void add_camera_command(CLI::App& app, Action& action) {
   command->add_option("--library", flags->library, "folder in which to file the camera by its lens setting");
   command->add_option("--poses", flags->poses,
                       "CSV to write: the sheet's pose in every photograph with sigmas");
+  command->add_option("--report", flags->report,
+                      "HTML page to write: coverage, residuals, uncertainty, every photograph");
   command->add_option("--compare", flags->compare, "two camera files to compare instead of calibrating")
       ->expected(2);
   command->add_option("--measured-ruler-mm", flags->ruler,
