@@ -9,7 +9,7 @@
 namespace hexcal {
 namespace {
 
-constexpr int kIterations = 50;
+constexpr int kFitIterations = 50;
 
 // A feature as numbers for Gauss-Newton: place, direction turned about two axes square to it, radius.
 struct Shape {
@@ -142,7 +142,7 @@ FittedFeature fit_feature(Feature::Kind kind, const Eigen::Matrix3Xd& points, co
     return fitted;
   }
   Shape shape = start(kind, chosen, faces);
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
+  for (int iteration = 0; iteration < kFitIterations; ++iteration) {
     Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
     Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
     for (const Eigen::Index i : kept) {

@@ -15,7 +15,7 @@ namespace {
 constexpr double kToleranceOfSide = 0.02;
 constexpr double kTolerancePx = 0.5;
 constexpr double kSupport = 0.5;  // largest mean misfit (0 to 1) of a frame that is accepted
-constexpr int kRefinements = 6;
+constexpr int kAssemblyRefinements = 6;
 constexpr std::size_t kMaxCandidates = 8;
 constexpr std::size_t kNumSeeds = 6;
 constexpr int kTrialFrames = 8;  // frames up to which a seed is tried
@@ -50,7 +50,7 @@ struct Piece {
 
 // Refines frame_from_body (markers known) or body_from_marker (frames known) on all pieces, robustly.
 void refine(const std::vector<Piece>& pieces, bool frame_unknown, Rigid3& pose) {
-  for (int i = 0; i < kRefinements; ++i) {
+  for (int i = 0; i < kAssemblyRefinements; ++i) {
     Matrix6d normal = Matrix6d::Zero();
     Vector6d right = Vector6d::Zero();
     for (const Piece& piece : pieces) {

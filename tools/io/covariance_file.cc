@@ -6,11 +6,10 @@
 
 #include "kinematics/geometry/covariance.h"
 #include "tools/io/csv_table.h"
+#include "tools/io/pose_table.h"
 
 namespace hexcal {
 namespace {
-
-double unit(int i) { return i < 3 ? 1.0 : kRadPerDeg; }
 
 constexpr const char* kSixColumns = "x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg";
 constexpr const char* kSixSigmas =
@@ -59,8 +58,10 @@ std::string format_photo_poses(const std::string& head, const CampaignObservatio
       const Pose pose = pose_from_home_from_lg(*photograph.UG_from_camera);
       const Matrix6d j = pose_parameters_jacobian(pose);
       const Matrix6d covariance = j * photograph.covariance * j.transpose();
-      for (int i = 0; i < 6; ++i) out += fmt::format(",{:.{}f}", pose.vector()[i] / unit(i), i < 3 ? 6 : 7);
-      for (int i = 0; i < 6; ++i) out += fmt::format(",{:.4g}", std::sqrt(covariance(i, i)) / unit(i));
+      for (int i = 0; i < 6; ++i)
+        out += fmt::format(",{:.{}f}", pose.vector()[i] / pose_column_unit(i), i < 3 ? 6 : 7);
+      for (int i = 0; i < 6; ++i)
+        out += fmt::format(",{:.4g}", std::sqrt(covariance(i, i)) / pose_column_unit(i));
     } else {
       out += ",,,,,,,,,,,,";
     }

@@ -19,14 +19,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kPoseNames{"x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg"};
 // Guess of the noise where nothing is known of it: only its ratio of mm to deg matters, and only at first.
 constexpr double kGuessedSigmaMm = 0.1;
 constexpr double kGuessedSigmaDeg = 0.03;
 // The joint covariance is dense: 6N x 6N.
 constexpr std::size_t kMostJointPoses = 1000;
-
-double unit(std::size_t i) { return i < 3 ? 1.0 : kRadPerDeg; }
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -63,8 +60,10 @@ PoseObservation read_row(const CsvTable& table, std::size_t row) {
   pose.id = table.text(row, "pose");
   Vector6d v = Vector6d::Zero();
   for (std::size_t i = 0; i < 6; ++i) {
-    pose.observed[i] = table.has_column(kPoseNames[i]) && !table.text(row, kPoseNames[i]).empty();
-    if (pose.observed[i]) v[static_cast<Eigen::Index>(i)] = table.number(row, kPoseNames[i]) * unit(i);
+    pose.observed[i] = table.has_column(kPoseColumns[i]) && !table.text(row, kPoseColumns[i]).empty();
+    if (pose.observed[i])
+      v[static_cast<Eigen::Index>(i)] =
+          table.number(row, kPoseColumns[i]) * pose_column_unit(static_cast<Eigen::Index>(i));
   }
   pose.measured = Pose::from_vector(v);
   return pose;
@@ -73,14 +72,14 @@ PoseObservation read_row(const CsvTable& table, std::size_t row) {
 bool read_sigma(const CsvTable& table, std::size_t row, PoseObservation& pose) {
   Vector6d sigma;
   for (std::size_t i = 0; i < 6; ++i) {
-    const std::string column = fmt::format("sigma_{}", kPoseNames[i]);
+    const std::string column = fmt::format("sigma_{}", kPoseColumns[i]);
     const auto k = static_cast<Eigen::Index>(i);
     sigma[k] = 0;
     if (!pose.observed[i]) continue;
     const auto value = table.has_column(column) ? table.optional_number(row, column) : std::nullopt;
     if (!value) return false;
     if (*value < 0) table.fail(row, column, fmt::format("found {}, wanted 0 or more", *value));
-    sigma[k] = *value * unit(i);
+    sigma[k] = *value * pose_column_unit(static_cast<Eigen::Index>(i));
   }
   pose.covariance = sigma.cwiseAbs2().asDiagonal();
   return true;

@@ -11,10 +11,7 @@
 namespace hexcal {
 namespace {
 
-constexpr std::array kPoseNames{"x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg"};
 constexpr std::array kLegNames{"q1", "q2", "q3", "q4", "q5", "q6"};
-
-double unit(std::size_t i) { return i < 3 ? 1.0 : kRadPerDeg; }
 
 std::string read_id(const CsvTable& table, std::size_t row, std::set<std::string>& seen) {
   const std::string& id = table.text(row, "pose");
@@ -39,7 +36,7 @@ std::optional<Vector6d> read_six(const CsvTable& table, std::size_t row,
 std::vector<PoseRecord> read_pose_table(const std::filesystem::path& path) {
   const CsvTable table = CsvTable::read(path);
   std::vector<std::string> required{"pose"};
-  required.insert(required.end(), kPoseNames.begin(), kPoseNames.end());
+  required.insert(required.end(), kPoseColumns.begin(), kPoseColumns.end());
   table.require_columns(required);
   const bool has_sigma = table.has_column("sigma_x_mm");
   std::set<std::string> seen;
@@ -48,7 +45,7 @@ std::vector<PoseRecord> read_pose_table(const std::filesystem::path& path) {
     PoseRecord record;
     record.id = read_id(table, row, seen);
     if (table.has_column("status")) record.status = table.text(row, "status");
-    if (auto v = read_six(table, row, kPoseNames, record.status != "ok")) {
+    if (auto v = read_six(table, row, kPoseColumns, record.status != "ok")) {
       v->tail<3>() *= kRadPerDeg;
       record.pose = Pose::from_vector(*v);
     }
@@ -56,9 +53,10 @@ std::vector<PoseRecord> read_pose_table(const std::filesystem::path& path) {
       Vector6d sigma;
       bool complete = true;
       for (std::size_t i = 0; i < 6; ++i) {
-        const auto value = table.optional_number(row, fmt::format("sigma_{}", kPoseNames[i]));
+        const auto value = table.optional_number(row, fmt::format("sigma_{}", kPoseColumns[i]));
         complete = complete && value.has_value();
-        sigma[static_cast<Eigen::Index>(i)] = value.value_or(0.0) * unit(i);
+        sigma[static_cast<Eigen::Index>(i)] =
+            value.value_or(0.0) * pose_column_unit(static_cast<Eigen::Index>(i));
       }
       if (complete) record.sigma = sigma;
     }
@@ -76,9 +74,9 @@ std::string format_pose_table(const std::string& head, const std::vector<PoseRec
   const bool measured = columns == PoseColumns::measured;
   std::string out = head + "pose";
   if (with_status) out += ",status";
-  for (const char* name : kPoseNames) out += fmt::format(",{}", name);
+  for (const char* name : kPoseColumns) out += fmt::format(",{}", name);
   if (measured) {
-    for (const char* name : kPoseNames) out += fmt::format(",sigma_{}", name);
+    for (const char* name : kPoseColumns) out += fmt::format(",sigma_{}", name);
     out += ",images,markers,rms_px";
   }
   out += '\n';
@@ -88,7 +86,9 @@ std::string format_pose_table(const std::string& head, const std::vector<PoseRec
     for (std::size_t i = 0; i < 6; ++i) {
       out += ',';
       if (record.pose) {
-        out += fmt::format("{:.{}f}", record.pose->vector()[static_cast<Eigen::Index>(i)] / unit(i),
+        out += fmt::format("{:.{}f}",
+                           record.pose->vector()[static_cast<Eigen::Index>(i)] /
+                               pose_column_unit(static_cast<Eigen::Index>(i)),
                            i < 3 ? 6 : 7);
       }
     }
@@ -96,7 +96,8 @@ std::string format_pose_table(const std::string& head, const std::vector<PoseRec
       for (std::size_t i = 0; i < 6; ++i) {
         out += ',';
         if (record.sigma)
-          out += fmt::format("{:.4g}", (*record.sigma)[static_cast<Eigen::Index>(i)] / unit(i));
+          out += fmt::format("{:.4g}", (*record.sigma)[static_cast<Eigen::Index>(i)] /
+                                           pose_column_unit(static_cast<Eigen::Index>(i)));
       }
       out += fmt::format(",{},{},", record.images.value_or(0), record.markers.value_or(0));
       if (record.rms_px) out += fmt::format("{:.4f}", *record.rms_px);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -9,6 +10,11 @@
 #include "kinematics/geometry/pose.h"
 
 namespace hexcal {
+
+/// Columns of a pose in every table, in the order of Pose::vector(), and of the actuator readings.
+inline constexpr std::array kPoseColumns{"x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg"};
+/// What one of column i of a pose is in mm or rad: files carry degrees, memory carries radians.
+[[nodiscard]] constexpr double pose_column_unit(Eigen::Index i) { return i < 3 ? 1.0 : kRadPerDeg; }
 
 /// One row of targets.csv, poses.csv or predicted_poses.csv. Absent columns are absent here.
 struct PoseRecord {

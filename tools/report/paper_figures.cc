@@ -12,7 +12,6 @@ namespace {
 
 // The paper names the parameters x-tran .. z-rot; roll, pitch and yaw are its x-, y- and z-rot.
 constexpr std::array kParameters{"x-tran", "y-tran", "z-tran", "x-rot", "y-rot", "z-rot"};
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 double unit(Eigen::Index i) { return i < 3 ? 1 : kDegPerRad; }
 
@@ -61,7 +60,7 @@ std::vector<double> absolute_errors(const MethodPoses& poses, Eigen::Index param
   std::vector<double> out;
   for (const auto& pair : poses.pairs) {
     out.push_back(pair ? std::abs(pose_error(pair->actual, pair->target)[parameter]) * unit(parameter)
-                       : kNone);
+                       : kNoNumber);
   }
   return out;
 }
@@ -314,9 +313,9 @@ HtmlTable fair_table(const PaperData& data) {
         {label_cell(poses->name, poses->note), number_cell(s.position_rms_mm, 4),
          number_cell(s.position_max_mm, 4), number_cell(s.orientation_rms_rad * kDegPerRad, 4),
          number_cell(s.orientation_max_rad * kDegPerRad, 4),
-         number_cell(first ? kNone : improvement_percent(before.position_rms_mm, s.position_rms_mm), 2),
-         number_cell(first ? kNone : improvement_percent(before.orientation_rms_rad, s.orientation_rms_rad),
-                     2),
+         number_cell(first ? kNoNumber : improvement_percent(before.position_rms_mm, s.position_rms_mm), 2),
+         number_cell(
+             first ? kNoNumber : improvement_percent(before.orientation_rms_rad, s.orientation_rms_rad), 2),
          number_cell(dropped, 0)});
   }
   return table;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 
 #include "tools/report/markup.h"
@@ -13,7 +12,6 @@ namespace hexcal {
 namespace {
 
 constexpr std::array kNames{"x", "y", "z", "roll", "pitch", "yaw"};
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 // Decimals that show a value down to about a tenth of its standard deviation.
 int decimals_for(double sigma, int otherwise) {
@@ -67,12 +65,12 @@ Html poses_section(const CampaignReport& report) {
         const std::array pair{PosePair{target->second, *record.pose}};
         error = error_statistics(pair);
       }
-      cells.push_back(number_cell(both ? error.position_rms_mm : kNone, 4));
-      cells.push_back(number_cell(both ? error.orientation_rms_rad * kDegPerRad : kNone, 4));
+      cells.push_back(number_cell(both ? error.position_rms_mm : kNoNumber, 4));
+      cells.push_back(number_cell(both ? error.orientation_rms_rad * kDegPerRad : kNoNumber, 4));
     }
-    cells.push_back(number_cell(record.images ? *record.images : kNone, 0));
-    cells.push_back(number_cell(record.markers ? *record.markers : kNone, 0));
-    cells.push_back(number_cell(record.rms_px.value_or(kNone), 3));
+    cells.push_back(number_cell(record.images ? *record.images : kNoNumber, 0));
+    cells.push_back(number_cell(record.markers ? *record.markers : kNoNumber, 0));
+    cells.push_back(number_cell(record.rms_px.value_or(kNoNumber), 3));
     table.rows.push_back(std::move(cells));
   }
   return html_table(table);
