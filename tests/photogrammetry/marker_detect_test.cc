@@ -4,6 +4,7 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
+#include "kinematics/geometry/pose.h"
 #include "photogrammetry/markers/detect.h"
 #include "tests/support/marker_renderer.h"
 
@@ -15,8 +16,6 @@ using testing::render_image;
 using testing::square_corners;
 using testing::TestImage;
 using testing::tilted_square;
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 struct Scene {
   cv::Mat grey;
@@ -96,8 +95,9 @@ TEST(DetectMarkers, SaturatedIsNamed) {
 }
 
 TEST(DetectMarkers, ToSteepIsNamed) {
-  EXPECT_EQ(status_of(one_marker(usual().patterns[5], 300, 0.4, 78 * kDegree).grey), MarkerStatus::too_steep);
-  EXPECT_EQ(status_of(one_marker(usual().patterns[5], 300, 0.4, 72 * kDegree).grey), MarkerStatus::ok);
+  EXPECT_EQ(status_of(one_marker(usual().patterns[5], 300, 0.4, 78 * kRadPerDeg).grey),
+            MarkerStatus::too_steep);
+  EXPECT_EQ(status_of(one_marker(usual().patterns[5], 300, 0.4, 72 * kRadPerDeg).grey), MarkerStatus::ok);
 }
 
 TEST(DetectMarkers, SmallFromFourteenPixels) {

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <numbers>
 
+#include "kinematics/geometry/pose.h"
 #include "photogrammetry/markers/refine.h"
 #include "tests/support/marker_renderer.h"
 
@@ -15,8 +16,6 @@ using testing::render_image;
 using testing::square_corners;
 using testing::TestImage;
 using testing::tilted_square;
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 std::array<Eigen::Vector2d, 4> moved(std::array<Eigen::Vector2d, 4> corners, double px) {
   for (std::size_t i = 0; i < 4; ++i)
@@ -44,7 +43,7 @@ TEST_P(RefineMarkerWithoutNoise, IsExactToRounding) {
   image.blur_px = view.blur_px;
   image.noise = 0;
   const Eigen::Vector2d centre(0.5 * image.width_px + 0.3, 0.5 * image.height_px - 0.4);
-  const Eigen::Matrix3d square = tilted_square(centre, view.side_px, 0.3, view.tilt_deg * kDegree, 0.7);
+  const Eigen::Matrix3d square = tilted_square(centre, view.side_px, 0.3, view.tilt_deg * kRadPerDeg, 0.7);
   const MarkerPattern& pattern = marker_family("tag36h11").patterns[17];
   const cv::Mat grey = render_image(image, {flat_marker(pattern, square)});
   const MarkerObservation marker =

@@ -29,7 +29,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Flags {
+struct CameraFlags {
   std::vector<fs::path> images;
   std::vector<fs::path> templates;
   fs::path output;
@@ -43,7 +43,7 @@ struct Flags {
   bool json = false;
 };
 
-constexpr const char* kFooter = R"(  hexcal camera photographs/ --template sheet.yaml -o camera.yaml
+constexpr const char* kCameraFooter = R"(  hexcal camera photographs/ --template sheet.yaml -o camera.yaml
 
   photograph     points  rejected  rms_px  tilt_deg  distance_mm  blur_px  status
   DSC_0001.JPG      164         0   0.011      31.2        912.4     0.71  ok
@@ -97,7 +97,7 @@ std::vector<Sheet> read_sheets(const std::vector<fs::path>& files) {
   return sheets;
 }
 
-CameraCalibrationOptions options_of(const Flags& flags) {
+CameraCalibrationOptions options_of(const CameraFlags& flags) {
   CameraCalibrationOptions options;
   if (!flags.lens.empty()) options.lens = lens_model_from_name(flags.lens);
   for (const BoardFreedom board : {BoardFreedom::ideal, BoardFreedom::warped, BoardFreedom::points}) {
@@ -122,7 +122,7 @@ void apply_ruler(const std::string& text, std::vector<Sheet>& sheets) {
   }
 }
 
-int compare(const Flags& flags) {
+int compare(const CameraFlags& flags) {
   const CameraComparison result =
       compare_cameras(read_camera_file(flags.compare[0]), read_camera_file(flags.compare[1]));
   const ProjectionDifference& d = result.difference;
@@ -152,7 +152,7 @@ int compare(const Flags& flags) {
 }
 
 // Writes everything asked for and returns the names.
-std::vector<std::string> write_files(const Flags& flags, const std::vector<Sheet>& sheets,
+std::vector<std::string> write_files(const CameraFlags& flags, const std::vector<Sheet>& sheets,
                                      const MeasuredCamera& measured, const CameraReport& report) {
   const CalibratedCamera camera{measured.calibration.fit.adjustment.state.camera, report.covariance,
                                 measured.setting, report.quality};
@@ -176,7 +176,7 @@ std::vector<std::string> write_files(const Flags& flags, const std::vector<Sheet
   return written;
 }
 
-int run(const Flags& flags) {
+int run_camera(const CameraFlags& flags) {
   if (!flags.compare.empty()) return compare(flags);
   if (flags.images.empty()) throw InputError("IMAGES: wanted photographs or a folder of them");
   if (flags.templates.empty()) throw InputError("--template: wanted the sheet.yaml of the printed sheet");
@@ -212,10 +212,10 @@ int run(const Flags& flags) {
 }  // namespace
 
 void add_camera_command(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<CameraFlags>();
   CLI::App* command = app.add_subcommand(
       "camera", "Calibrate a camera at one zoom setting from 10 to 20 photographs of a printed sheet.");
-  command->footer(kFooter);
+  command->footer(kCameraFooter);
   command->add_option("IMAGES", flags->images, "photographs, or folders of them");
   command->add_option("--template", flags->templates, "sheet.yaml of the printed sheet; may be repeated");
   command->add_option("-o,--output", flags->output, "camera file to write");
@@ -235,7 +235,7 @@ void add_camera_command(CLI::App& app, Action& action) {
                    "freedom of the printed sheet instead of the one chosen by evidence")
       ->check(CLI::IsMember({"ideal", "warped", "points"}));
   command->add_flag("--json", flags->json, "print JSON");
-  command->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+  command->callback([flags, &action] { action = [flags] { return run_camera(*flags); }; });
 }
 
 }  // namespace hexcal

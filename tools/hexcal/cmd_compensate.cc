@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Flags {
+struct CompensateFlags {
   fs::path campaign;
   fs::path hexapod, targets, poses, legs, covariance, apply, out;
   std::string method = "auto";
@@ -41,7 +41,7 @@ std::optional<fs::path> optional_path(const fs::path& path) {
 }
 
 // Fills from the campaign what the flags leave open.
-void resolve(Flags& flags) {
+void resolve(CompensateFlags& flags) {
   if (!flags.campaign.empty()) {
     const Campaign campaign = read_campaign(flags.campaign);
     const fs::path results = campaign.folder / "results";
@@ -62,7 +62,7 @@ void resolve(Flags& flags) {
 
 // Round n uses the poses measured after the compensations of rounds 1 .. n - 1: OUT/round2/poses.csv was
 // measured with OUT/actuators.csv, OUT/round3/poses.csv with OUT/round2/actuators.csv, and so on.
-void add_later_rounds(const PlatformGeometry& nominal, const Flags& flags,
+void add_later_rounds(const PlatformGeometry& nominal, const CompensateFlags& flags,
                       const ObservationDefaults& defaults, ObservationTable& table,
                       std::vector<fs::path>& inputs) {
   fs::path commanded = flags.out / "actuators.csv";
@@ -126,7 +126,7 @@ std::vector<fs::path> write_results(const fs::path& folder, const std::string& h
   return written;
 }
 
-int run(Flags flags) {
+int run_compensate(CompensateFlags flags) {
   resolve(flags);
   const PlatformGeometry nominal = read_hexapod_file(flags.hexapod);
   ObservationDefaults defaults;
@@ -175,7 +175,7 @@ int run(Flags flags) {
 }  // namespace
 
 void add_compensate_command(CLI::App& app, Action& action) {
-  const auto flags = std::make_shared<Flags>();
+  const auto flags = std::make_shared<CompensateFlags>();
   CLI::App* command = app.add_subcommand(
       "compensate", "Identify the machine from measured poses; write the model and corrected commands");
   command->add_option("campaign", flags->campaign, "campaign folder; results/poses.csv must be measured");
@@ -217,7 +217,7 @@ void add_compensate_command(CLI::App& app, Action& action) {
       "  none                0  9.4106  0.7210  17.253   3.8641  0.2811   6.912      0\n"
       "  option3            12  5.1033  0.4012   9.910   2.1107  0.1620   4.310      4\n"
       "* kinematic          48  0.0131  0.0010   0.030   0.0034  0.0003   0.007      1");
-  command->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+  command->callback([flags, &action] { action = [flags] { return run_compensate(*flags); }; });
 }
 
 }  // namespace hexcal

@@ -9,7 +9,7 @@
 namespace hexcal {
 namespace {
 
-constexpr const char* kFooter = R"(Sample use:
+constexpr const char* kCompletionFooter = R"(Sample use:
   hexcal completion bash > ~/.local/share/bash-completion/completions/hexcal
   hexcal completion zsh > ~/.zfunc/_hexcal
   hexcal completion fish > ~/.config/fish/completions/hexcal.fish
@@ -19,7 +19,7 @@ constexpr const char* kFooter = R"(Sample use:
 
 void add_completion_command(CLI::App& app, Action& action) {
   CLI::App* command = app.add_subcommand("completion", "Print shell completion or the manual page");
-  command->footer(kFooter);
+  command->footer(kCompletionFooter);
   const auto kind = std::make_shared<std::string>();
   command->add_option("KIND", *kind, "what to print")
       ->required()

@@ -24,13 +24,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kFooter = R"(Sample output:
+constexpr const char* kDetectFooter = R"(Sample output:
   photograph    found  not usable
   DSC_0001.JPG     16
   DSC_0002.JPG     15  104 cut_by_frame
   2 photographs, 31 markers in observations.txt)";
 
-struct Flags {
+struct DetectFlags {
   std::vector<fs::path> images;
   std::string family = "tag36h11";
   std::vector<int> ids;
@@ -91,7 +91,7 @@ int count_ok(const PhotographObservations& photograph) {
                     [](const MarkerObservation& marker) { return marker.status == MarkerStatus::ok; }));
 }
 
-int run(const Flags& flags) {
+int run_detect(const DetectFlags& flags) {
   const MarkerFamily& family = marker_family(flags.family);
   const std::vector<Source> sources = list_photographs(flags.images);
   std::optional<CalibratedCamera> camera;
@@ -147,8 +147,8 @@ int run(const Flags& flags) {
 void add_detect_command(CLI::App& app, Action& action) {
   CLI::App* command =
       app.add_subcommand("detect", "Measure the markers in photographs, for measure --observations");
-  command->footer(kFooter);
-  const auto flags = std::make_shared<Flags>();
+  command->footer(kDetectFooter);
+  const auto flags = std::make_shared<DetectFlags>();
   command->add_option("IMAGES", flags->images, "photographs, or folders of them")->required();
   command->add_option("--family", flags->family, "of the markers: tag36h11, DICT_4X4_50, ...")
       ->capture_default_str();
@@ -156,7 +156,7 @@ void add_detect_command(CLI::App& app, Action& action) {
   command->add_option("--camera", flags->camera, "camera.yaml whose lens stands inside the measurement");
   command->add_option("-o,--output", flags->output, "file of observations to write")->required();
   command->add_flag("--json", flags->json, "print the summary as JSON");
-  command->callback([&action, flags] { action = [flags] { return run(*flags); }; });
+  command->callback([&action, flags] { action = [flags] { return run_detect(*flags); }; });
 }
 
 }  // namespace hexcal

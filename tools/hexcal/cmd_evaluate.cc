@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-struct Flags {
+struct EvaluateFlags {
   fs::path targets;
   fs::path before;
   std::vector<fs::path> after;
@@ -138,7 +138,7 @@ std::string fair_table(const std::vector<EvaluatedTable>& tables) {
   return text.text();
 }
 
-int run(const Flags& flags) {
+int run_evaluate(const EvaluateFlags& flags) {
   PoseById targets;
   for (const PoseRecord& record : read_pose_table(flags.targets)) {
     if (record.pose) targets[record.id] = *record.pose;
@@ -192,7 +192,7 @@ int run(const Flags& flags) {
 }  // namespace
 
 void add_evaluate_command(CLI::App& app, Action& action) {
-  const auto flags = std::make_shared<Flags>();
+  const auto flags = std::make_shared<EvaluateFlags>();
   CLI::App* command =
       app.add_subcommand("evaluate", "Compare pose tables: the paper's tables 2-4 and true rms");
   command->add_option("--targets", flags->targets, "poses that were wanted (targets.csv)")->required();
@@ -207,7 +207,7 @@ void add_evaluate_command(CLI::App& app, Action& action) {
       "  true errors over the same 34 poses   rms_mm  max_mm  rms_deg  max_deg  position  orientation\n"
       "  before                               9.4106 17.2530   3.8641   6.9120\n"
       "  after                                0.0131  0.0302   0.0034   0.0071   99.86 %      99.91 %");
-  command->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+  command->callback([flags, &action] { action = [flags] { return run_evaluate(*flags); }; });
 }
 
 }  // namespace hexcal

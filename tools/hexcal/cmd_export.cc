@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Flags {
+struct ExportFlags {
   fs::path input;
   std::string format;
   fs::path output;
@@ -55,13 +55,13 @@ bool is_camera_file(const fs::path& path) {
   return text.find("\nimage_size_px:") != std::string::npos && text.find("\nmodel:") != std::string::npos;
 }
 
-void export_hexcal_camera(const Flags& flags) {
+void export_hexcal_camera(const ExportFlags& flags) {
   const CameraExport result = export_camera(read_camera_file(flags.input), flags.format);
   write_file_atomically(flags.output, result.text);
   print_fit(flags.output, result.model, result.rms_px, result.max_px);
 }
 
-void import_camera(const Flags& flags) {
+void import_camera(const ExportFlags& flags) {
   const ForeignCamera foreign = read_foreign_camera(flags.input);
   write_file_atomically(
       flags.output, format_camera_file(provenance_line(kVersion, "export", {flags.input}), foreign.camera));
@@ -79,7 +79,7 @@ bool has_column(const fs::path& path, const char* column) {
   return path.extension() == ".csv" && CsvTable::read(path).has_column(column);
 }
 
-void want_format(const Flags& flags, std::initializer_list<const char*> wanted) {
+void want_format(const ExportFlags& flags, std::initializer_list<const char*> wanted) {
   if (std::find(wanted.begin(), wanted.end(), flags.format) == wanted.end())
     throw InputError(fmt::format("--to: found '{}' for {}, wanted {}", flags.format, flags.input.string(),
                                  fmt::join(wanted, " or ")));
@@ -98,7 +98,7 @@ double difference_of_readings(const PlatformGeometry& a, const PlatformGeometry&
   return most;
 }
 
-void export_model(const Flags& flags) {
+void export_model(const ExportFlags& flags) {
   want_format(flags, {"linuxcnc"});
   const CalibrationModel model = read_model_file(flags.input);
   const std::string text = linuxcnc_text(provenance_line(kVersion, "export", {flags.input}), model);
@@ -110,7 +110,7 @@ void export_model(const Flags& flags) {
              difference);
 }
 
-void export_poses(const Flags& flags) {
+void export_poses(const ExportFlags& flags) {
   want_format(flags, {"pi-gcs", "csv"});
   std::vector<PoseRecord> poses = read_pose_table(flags.input);
   const std::size_t all = poses.size();
@@ -128,7 +128,7 @@ void export_poses(const Flags& flags) {
   fmt::print("wrote {}: {} of {} poses can be reached\n", flags.output.string(), poses.size(), all);
 }
 
-void export_actuators(const Flags& flags) {
+void export_actuators(const ExportFlags& flags) {
   want_format(flags, {"csv"});
   std::vector<LegRecord> legs = read_leg_table(flags.input);
   const std::size_t all = legs.size();
@@ -141,7 +141,7 @@ void export_actuators(const Flags& flags) {
 struct FileKind {
   const char* name;
   bool (*is)(const fs::path& path, const std::string& format);
-  void (*write)(const Flags& flags);
+  void (*write)(const ExportFlags& flags);
 };
 
 constexpr FileKind kFileKinds[] = {
@@ -156,7 +156,7 @@ constexpr FileKind kFileKinds[] = {
      export_poses},
 };
 
-int run(const Flags& flags) {
+int run_export(const ExportFlags& flags) {
   for (const FileKind& kind : kFileKinds) {
     if (!kind.is(flags.input, flags.format)) continue;
     kind.write(flags);
@@ -170,7 +170,7 @@ int run(const Flags& flags) {
 }  // namespace
 
 void add_export_command(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<ExportFlags>();
   CLI::App* command = app.add_subcommand("export", kSynopsis);
   command
       ->add_option("FILE", flags->input,
@@ -186,7 +186,7 @@ void add_export_command(CLI::App& app, Action& action) {
                                fmt::join(camera_export_formats(), ", ")))
       ->required();
   command->add_option("-o,--output", flags->output, "file to write")->required();
-  command->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+  command->callback([flags, &action] { action = [flags] { return run_export(*flags); }; });
 }
 
 }  // namespace hexcal

@@ -15,7 +15,7 @@
 namespace hexcal {
 namespace {
 
-struct Flags {
+struct LegsFlags {
   MachineFlags machine;
   std::filesystem::path poses;
   std::filesystem::path out = "legs.csv";
@@ -41,7 +41,7 @@ Answer solve(const Machine& machine, const Pose& pose) {
   return answer;
 }
 
-int run(const Flags& flags) {
+int run_legs(const LegsFlags& flags) {
   if (flags.poses.empty() == flags.pose.empty())
     throw InputError("--poses, --pose: found none or both, wanted exactly one of them");
   const Machine machine = read_machine(flags.machine);
@@ -82,7 +82,7 @@ int run(const Flags& flags) {
 }  // namespace
 
 void add_legs_command(CLI::App& app, Action& action) {
-  const auto flags = std::make_shared<Flags>();
+  const auto flags = std::make_shared<LegsFlags>();
   CLI::App* command = app.add_subcommand("legs", "Actuator readings at poses (inverse kinematics)");
   flags->machine.add_to(*command);
   command->add_option("--poses", flags->poses, "pose,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg");
@@ -98,7 +98,7 @@ void add_legs_command(CLI::App& app, Action& action) {
       "  pose,status,q1,q2,q3,q4,q5,q6\n"
       "  p01,ok,462.113924310,455.940112218,449.070613925,460.311207006,471.514830772,468.200914551\n"
       "  p02,too_long,601.220418832,540.118230912,511.230441871,498.553301764,530.664102215,588.910342256");
-  command->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+  command->callback([flags, &action] { action = [flags] { return run_legs(*flags); }; });
 }
 
 }  // namespace hexcal

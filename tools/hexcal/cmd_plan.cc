@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Flags {
+struct PlanFlags {
   fs::path campaign, hexapod, targets, candidates, load_paths, out;
   std::size_t count = 12;
   std::string criterion = "i";
@@ -47,7 +47,7 @@ double tilt_deg(const Pose& pose) {
   return std::atan2(z.head<2>().norm(), z.z()) * kDegPerRad;
 }
 
-int run(Flags flags) {
+int run_plan(PlanFlags flags) {
   constexpr std::size_t kCandidates = 2000;
   if (!flags.campaign.empty()) {
     const Campaign campaign = read_campaign(flags.campaign);
@@ -136,7 +136,7 @@ int run(Flags flags) {
 }  // namespace
 
 void add_plan_command(CLI::App& app, Action& action) {
-  const auto flags = std::make_shared<Flags>();
+  const auto flags = std::make_shared<PlanFlags>();
   CLI::App* command = app.add_subcommand("plan", "Choose the poses that identify the machine best");
   command->add_option("campaign", flags->campaign, "campaign folder that names hexapod.yaml");
   command->add_option("--hexapod", flags->hexapod, "nominal geometry (hexapod.yaml)");
@@ -166,7 +166,7 @@ void add_plan_command(CLI::App& app, Action& action) {
       "output:\n"
       "  poses  planned_mm  planned_deg  unplanned_mm  unplanned_deg\n"
       "  12         0.0412       0.0134        0.0920         0.0281");
-  command->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+  command->callback([flags, &action] { action = [flags] { return run_plan(*flags); }; });
 }
 
 }  // namespace hexcal

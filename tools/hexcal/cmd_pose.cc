@@ -17,7 +17,7 @@
 namespace hexcal {
 namespace {
 
-struct Flags {
+struct PoseFlags {
   MachineFlags machine;
   std::filesystem::path legs;
   std::filesystem::path out = "poses.csv";
@@ -91,7 +91,7 @@ bool append_modes(const Machine& machine, std::string_view id, const LegVector& 
   return modes.complete() && !modes.modes.empty();
 }
 
-bool append_row(const Machine& machine, const Flags& flags, const PoseBox& box, std::string_view id,
+bool append_row(const Machine& machine, const PoseFlags& flags, const PoseBox& box, std::string_view id,
                 const LegVector& readings, std::string& out, std::string& why) {
   if (flags.all) return append_modes(machine, id, readings, out);
   const Answer answer = solve(machine, readings);
@@ -117,7 +117,7 @@ bool append_row(const Machine& machine, const Flags& flags, const PoseBox& box, 
   return good;
 }
 
-int run(const Flags& flags) {
+int run_pose(const PoseFlags& flags) {
   if (flags.legs.empty() == flags.readings.empty())
     throw InputError("--legs, --readings: found none or both, wanted exactly one of them");
   if (flags.certify && flags.all) throw InputError("--certify, --all: found both, wanted one of them");
@@ -156,7 +156,7 @@ int run(const Flags& flags) {
 }  // namespace
 
 void add_pose_command(CLI::App& app, Action& action) {
-  const auto flags = std::make_shared<Flags>();
+  const auto flags = std::make_shared<PoseFlags>();
   CLI::App* command = app.add_subcommand("pose", "Poses at actuator readings (forward kinematics)");
   flags->machine.add_to(*command);
   command->add_option("--legs", flags->legs, "pose,q1,...,q6");
@@ -177,7 +177,7 @@ void add_pose_command(CLI::App& app, Action& action) {
       "Sample output:\n"
       "  pose,status,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg,certificate,poses_in_box\n"
       "  p01,ok,5.000000000,-3.000000000,2.000000000,0.5000000000,1.0000000000,-2.0000000000,unique,1");
-  command->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+  command->callback([flags, &action] { action = [flags] { return run_pose(*flags); }; });
 }
 
 }  // namespace hexcal

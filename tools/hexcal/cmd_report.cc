@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Flags {
+struct ReportFlags {
   fs::path campaign, out, figures, compare;
   std::string method = "auto";
 };
@@ -30,7 +30,7 @@ std::string folder_name(const fs::path& folder) {
 
 // The same identification as `hexcal compensate` makes; it costs less than reading its result back would
 // save.
-void add_compensation(const Campaign& campaign, const Flags& flags, CampaignReport& report,
+void add_compensation(const Campaign& campaign, const ReportFlags& flags, CampaignReport& report,
                       std::vector<fs::path>& inputs) {
   const fs::path results = campaign.folder / "results";
   if (!campaign.hexapod) {
@@ -69,7 +69,7 @@ void add_compensation(const Campaign& campaign, const Flags& flags, CampaignRepo
   }
 }
 
-CampaignReport read_report(const Flags& flags) {
+CampaignReport read_report(const ReportFlags& flags) {
   const Campaign campaign = read_campaign(flags.campaign);
   const fs::path results = campaign.folder / "results";
   CampaignReport report;
@@ -103,7 +103,7 @@ CampaignReport read_report(const Flags& flags) {
   return report;
 }
 
-int run(const Flags& flags) {
+int run_report(const ReportFlags& flags) {
   const CampaignReport report = read_report(flags);
   const fs::path folder = fs::is_directory(flags.campaign) ? flags.campaign : flags.campaign.parent_path();
   const fs::path out = flags.out.empty() ? folder / "results" / "report.html" : flags.out;
@@ -124,7 +124,7 @@ int run(const Flags& flags) {
 }  // namespace
 
 void add_report_command(CLI::App& app, Action& action) {
-  const auto flags = std::make_shared<Flags>();
+  const auto flags = std::make_shared<ReportFlags>();
   CLI::App* command = app.add_subcommand("report", "Write one self-contained HTML page about a campaign");
   command->add_option("campaign", flags->campaign, "campaign folder, measured")->required();
   command->add_option("-o,--out", flags->out, "the page (default: results/report.html of the campaign)");
@@ -139,7 +139,7 @@ void add_report_command(CLI::App& app, Action& action) {
       "  Good: Compensation by kinematic takes the position error from 9.41 to 0.0131 mm rms (99.9 % less) "
       "...\n"
       "  wrote tiger/results/report.html");
-  command->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+  command->callback([flags, &action] { action = [flags] { return run_report(*flags); }; });
 }
 
 }  // namespace hexcal

@@ -14,7 +14,7 @@
 namespace hexcal {
 namespace {
 
-struct Flags {
+struct RunFlags {
   std::string campaign;
   std::string method;
 };
@@ -34,7 +34,7 @@ int run_stage(void (*add)(CLI::App&, Action&), std::vector<std::string> argument
   return code;
 }
 
-int run(const Flags& flags) {
+int run_run(const RunFlags& flags) {
   const Campaign campaign = read_campaign(flags.campaign);
   int worst = run_stage(add_measure_command, {"measure", flags.campaign});
   if (campaign.hexapod && campaign.targets) {
@@ -50,7 +50,7 @@ int run(const Flags& flags) {
 }  // namespace
 
 void add_run_command(CLI::App& app, Action& action) {
-  const auto flags = std::make_shared<Flags>();
+  const auto flags = std::make_shared<RunFlags>();
   CLI::App* command =
       app.add_subcommand("run", "Photographs in, corrected actuator commands out: the main job");
   command->add_option("campaign", flags->campaign, "campaign folder")->required();
@@ -59,7 +59,7 @@ void add_run_command(CLI::App& app, Action& action) {
       "The same as: hexcal measure CAMPAIGN; hexcal compensate CAMPAIGN; hexcal report CAMPAIGN.\n"
       "Results are in CAMPAIGN/results: poses.csv, model.yaml, predicted_poses.csv, actuators.csv, "
       "report.html.");
-  command->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+  command->callback([flags, &action] { action = [flags] { return run_run(*flags); }; });
 }
 
 }  // namespace hexcal

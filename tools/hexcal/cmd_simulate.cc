@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Flags {
+struct SimulateFlags {
   fs::path out;
   fs::path from;
   fs::path commands;
@@ -31,13 +31,13 @@ struct Flags {
 };
 
 // A round is known by its commands and targets, so that another set of commands gets other camera stations.
-std::uint64_t round_number(const Flags& flags) {
+std::uint64_t round_number(const SimulateFlags& flags) {
   std::string inputs = read_file(flags.commands);
   if (!flags.targets.empty()) inputs += read_file(flags.targets);
   return 1 + std::stoull(sha256_hex(inputs).substr(0, 8), nullptr, 16);
 }
 
-int run(const Flags& flags) {
+int run_simulate(const SimulateFlags& flags) {
   SimulationOptions options = flags.options;
   options.brown_lens = flags.lens == "brown";
   RoundOptions round;
@@ -77,7 +77,7 @@ int run(const Flags& flags) {
 }  // namespace
 
 void add_simulate_command(CLI::App& app, Action& action) {
-  const auto flags = std::make_shared<Flags>();
+  const auto flags = std::make_shared<SimulateFlags>();
   SimulationOptions& options = flags->options;
   CLI::App* command =
       app.add_subcommand("simulate", "Render a campaign with a virtual hexapod and known truth");
@@ -149,7 +149,7 @@ void add_simulate_command(CLI::App& app, Action& action) {
       "  lab1: 53 photographs, truth in lab1/truth\n"
       "Second round, the machine's answer to corrected commands:\n"
       "  hexcal simulate -o lab2 --from lab1 --commands lab1/results/actuators.csv");
-  command->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+  command->callback([flags, &action] { action = [flags] { return run_simulate(*flags); }; });
 }
 
 }  // namespace hexcal

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Flags {
+struct TemplateFlags {
   std::string kind;
   fs::path output;
   std::string family;
@@ -30,7 +30,7 @@ struct Flags {
   double marker_mm = 0, gap_mm = 0, square_mm = 0, pitch_mm = 0, dot_mm = 0;
 };
 
-constexpr const char* kFooter =
+constexpr const char* kTemplateFooter =
     R"(  hexcal template aprilgrid --marker-mm 20 --gap-mm 7 --paper A3 --landscape -o sheet.pdf
   hexcal template chessboard --square-mm 20 --columns 12 --rows 8 -o board.pdf
   hexcal template charuco --square-mm 22 --marker-mm 16 -o charuco.pdf
@@ -72,7 +72,7 @@ double wanted(double value, const char* flag) {
   return value;
 }
 
-Sheet sheet_from(const Flags& flags) {
+Sheet sheet_from(const TemplateFlags& flags) {
   Sheet sheet;
   sheet.kind = *sheet_kind_from_name(flags.kind);
   sheet.first_id = flags.first_id;
@@ -103,7 +103,7 @@ Sheet sheet_from(const Flags& flags) {
   return sheet;
 }
 
-void set_grid(Sheet& sheet, const Flags& flags, const TemplatePdfOptions& options) {
+void set_grid(Sheet& sheet, const TemplateFlags& flags, const TemplatePdfOptions& options) {
   const auto [columns, rows] = largest_grid(sheet, options);
   const bool photomodeler = sheet.kind == SheetKind::photomodeler;
   sheet.columns = flags.columns > 0 ? flags.columns : photomodeler ? 10 : columns;
@@ -117,7 +117,7 @@ void set_grid(Sheet& sheet, const Flags& flags, const TemplatePdfOptions& option
   sheet.validate();
 }
 
-int run(const Flags& flags) {
+int run_template(const TemplateFlags& flags) {
   TemplatePdfOptions options;
   const auto paper = paper_size(flags.paper);
   if (!paper) {
@@ -156,10 +156,10 @@ int run(const Flags& flags) {
 }  // namespace
 
 void add_template_command(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<TemplateFlags>();
   CLI::App* command =
       app.add_subcommand("template", "Draw a calibration sheet or markers as a vector PDF, true to scale.");
-  command->footer(kFooter);
+  command->footer(kTemplateFooter);
   command->add_option("KIND", flags->kind, fmt::format("one of {}", fmt::join(sheet_kind_names(), ", ")))
       ->required()
       ->check(CLI::IsMember(sheet_kind_names()));
@@ -182,7 +182,7 @@ void add_template_command(CLI::App& app, Action& action) {
       ->check(CLI::Range(1, 100));
   command->add_option("--paper", flags->paper, "A4, A3, letter, legal or WIDTHxHEIGHT in mm");
   command->add_flag("--landscape", flags->landscape, "turn the paper");
-  command->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+  command->callback([flags, &action] { action = [flags] { return run_template(*flags); }; });
 }
 
 }  // namespace hexcal

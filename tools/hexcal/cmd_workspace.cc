@@ -19,7 +19,7 @@
 namespace hexcal {
 namespace {
 
-struct Flags {
+struct WorkspaceFlags {
   MachineFlags machine;
   std::filesystem::path poses;
   std::filesystem::path out = "workspace.csv";
@@ -56,11 +56,11 @@ void append_cell(std::string& out, const SliceCell& cell) {
   out += '\n';
 }
 
-std::string head_of(const Flags& flags) {
+std::string head_of(const WorkspaceFlags& flags) {
   return provenance_line(kVersion, "workspace", {machine_file(flags.machine)});
 }
 
-PoseMargins margins_of(const Flags& flags) {
+PoseMargins margins_of(const WorkspaceFlags& flags) {
   PoseMargins margins;
   margins.stroke_mm = flags.margin_mm;
   margins.clearance_mm = flags.margin_mm;
@@ -68,7 +68,7 @@ PoseMargins margins_of(const Flags& flags) {
   return margins;
 }
 
-int judge_table(const Flags& flags, const Machine& machine) {
+int judge_table(const WorkspaceFlags& flags, const Machine& machine) {
   RowTransform transform;
   transform.columns = {"x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg"};
   transform.header = std::string("pose,") + kColumns;
@@ -88,7 +88,7 @@ int judge_table(const Flags& flags, const Machine& machine) {
   return kSomeFailed;
 }
 
-int axis_of(const std::string& text, const Flags& flags) {
+int axis_of(const std::string& text, const WorkspaceFlags& flags) {
   const std::array<const char*, 6> names{"x", "y", "z", "roll", "pitch", "yaw"};
   for (std::size_t k = 0; k < 6; ++k) {
     if (text == names[k]) return static_cast<int>(k);
@@ -128,7 +128,7 @@ bool widen(const std::vector<SliceCell>& cells, SliceOptions& options) {
          options.v_high > before.v_high;
 }
 
-int draw_slice(const Flags& flags, const Machine& machine) {
+int draw_slice(const WorkspaceFlags& flags, const Machine& machine) {
   const std::size_t comma = flags.slice.find(',');
   SliceOptions options;
   options.axis_u = axis_of(flags.slice.substr(0, comma), flags);
@@ -153,7 +153,7 @@ int draw_slice(const Flags& flags, const Machine& machine) {
   return kDone;
 }
 
-int print_box(const Flags& flags, const Machine& machine) {
+int print_box(const WorkspaceFlags& flags, const Machine& machine) {
   BoxOptions options;
   options.rpy_rad = pose_from_mm_deg(six_numbers(flags.at, "--at")).rpy_rad;
   options.margins = margins_of(flags);
@@ -168,7 +168,7 @@ int print_box(const Flags& flags, const Machine& machine) {
   return kDone;
 }
 
-int write_sample(const Flags& flags, const Machine& machine) {
+int write_sample(const WorkspaceFlags& flags, const Machine& machine) {
   SampleOptions options;
   options.count = flags.count;
   options.seed = flags.seed;
@@ -191,7 +191,7 @@ int write_sample(const Flags& flags, const Machine& machine) {
   return kSomeFailed;
 }
 
-int run(const Flags& flags) {
+int run_workspace(const WorkspaceFlags& flags) {
   const int jobs = static_cast<int>(!flags.poses.empty()) + static_cast<int>(!flags.slice.empty()) +
                    static_cast<int>(!flags.sample.empty()) + static_cast<int>(flags.box);
   if (jobs != 1)
@@ -208,7 +208,7 @@ int run(const Flags& flags) {
 }  // namespace
 
 void add_workspace_command(CLI::App& app, Action& action) {
-  const auto flags = std::make_shared<Flags>();
+  const auto flags = std::make_shared<WorkspaceFlags>();
   CLI::App* command =
       app.add_subcommand("workspace", "Verdicts on poses, slices and samples of the workspace");
   flags->machine.add_to(*command);
@@ -250,7 +250,7 @@ void add_workspace_command(CLI::App& app, Action& action) {
       "  pose,status,x_mm,...,stroke_margin_mm,joint_margin_deg,clearance_mm,singular_mm,sigma_min\n"
       "  p01,ok,5.000000,...,71.2043,38.1203,,190.211,0.283104\n"
       "  p02,near_singular,0.000000,...,12.0031,4.2210,,3.914,0.011873");
-  command->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+  command->callback([flags, &action] { action = [flags] { return run_workspace(*flags); }; });
 }
 
 }  // namespace hexcal
