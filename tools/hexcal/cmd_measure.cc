@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 
+#include "kinematics/geometry/input_error.h"
 #include "tools/hexcal/campaign_measurement.h"
 #include "tools/hexcal/commands.h"
 #include "tools/hexcal/terminal.h"
@@ -34,6 +36,21 @@ int list_only(const OpenCampaign& open) {
   return kDone;
 }
 
+// A camera file that suits no photograph at all is a mistake in the files, not a bad pose: nothing is written
+// then.
+void refuse_foreign_camera(const std::filesystem::path& campaign, const CampaignObservations& observations,
+                           const CampaignResult& result) {
+  const std::vector<MeasuredPhotograph>& photographs = result.photographs;
+  if (photographs.empty() || !std::ranges::all_of(photographs, [](const MeasuredPhotograph& photograph) {
+        return photograph.status == PhotoStatus::wrong_camera;
+      })) {
+    return;
+  }
+  throw InputError(fmt::format("{}: none of the {} photographs suits a camera file; {}: {}",
+                               campaign.string(), photographs.size(),
+                               observations.photographs.front().seen.name, photographs.front().words));
+}
+
 int measure(MeasureFlags flags) {
   MeasureRequest& request = flags.request;
   request.interior_fixed = flags.interior == "fixed";
@@ -49,6 +66,7 @@ int measure(MeasureFlags flags) {
     observations = observe_campaign(request, open, [&progress] { progress.advance(); });
   }
   const CampaignResult result = extract_poses(open.campaign, observations, extract_options(request));
+  refuse_foreign_camera(request.campaign, observations, result);
   const std::vector<std::filesystem::path> written = write_results(request, open, observations, result);
   if (flags.json) {
     fmt::print("{}", measurement_json(observations, result, open.listing));

@@ -127,8 +127,14 @@ void YamlMap::fail(const std::string& key, const std::string& message) const {
 
 namespace {
 YAML::Node require(const YamlMap& map, const YAML::Node& node, const std::string& key, const char* wanted) {
-  if (!map.has(key)) map.fail(key, fmt::format("missing, wanted {}", wanted));
-  return find(node, key);
+  if (map.has(key)) return find(node, key);
+  std::string message = fmt::format("missing, wanted {}", wanted);
+  for (const auto& entry : node) {  // most often it is there, misspelt
+    const std::string other = entry.first.IsScalar() ? entry.first.Scalar() : std::string();
+    if (other != key && edit_distance(other, key) <= std::min<std::size_t>(2, key.size() / 3))
+      message += fmt::format("; '{}' in line {} looks like it", other, entry.first.Mark().line + 1);
+  }
+  map.fail(key, message);
 }
 }  // namespace
 
