@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The whole way on rendered photographs: a virtual Stewart platform with hidden errors is photographed, the camera is
-# calibrated, the poses are measured, the machine is identified, and the corrected commands are tried on the same
-# machine. Ends with two tables: measured against true poses, and errors before and after compensation.
+# calibrated, the poses are measured, the machine is identified, and corrected commands for other poses are tried on the
+# same machine. Ends with two tables: measured against true poses, and errors before and after compensation.
 # Usage: tools/dev/demo.sh [FOLDER]   (default build/demo; an existing folder is replaced)
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -24,12 +24,16 @@ step "calibrate the camera"
 "$hexcal" camera "$folder/round1/calibration" --template "$folder/round1/sheet.yaml" -o "$folder/round1/camera.yaml"
 step "measure, compensate, report"
 "$hexcal" run "$folder/round1"
-step "second round: the same machine at the corrected commands"
-"$hexcal" simulate -o "$folder/round2" --from "$folder/round1" \
-  --commands "$folder/round1/results/actuators.csv" --no-images
+step "correct the commands for $poses other poses, which were never photographed, and try them on the same machine"
+"$hexcal" simulate -o "$folder/other" --poses "$poses" --seed 67 --no-images
+"$hexcal" compensate "$folder/round1" --apply "$folder/other/targets.csv" -o "$folder/corrected"
+"$hexcal" simulate -o "$folder/before" --from "$folder/round1" --targets "$folder/other/targets.csv" \
+  --commands "$folder/other/legs.csv" --no-images
+"$hexcal" simulate -o "$folder/after" --from "$folder/round1" --targets "$folder/other/targets.csv" \
+  --commands "$folder/corrected/actuators.csv" --no-images
 
 step "measured poses against the truth"
 "$hexcal" evaluate --targets "$folder/round1/truth/poses.csv" --before "$folder/round1/results/poses.csv"
-step "true errors of the machine before and after compensation"
-"$hexcal" evaluate --targets "$folder/round1/targets.csv" --before "$folder/round1/truth/poses.csv" \
-  --after "$folder/round2/truth/poses.csv"
+step "true errors of the machine at the other poses before and after compensation"
+"$hexcal" evaluate --targets "$folder/other/targets.csv" --before "$folder/before/truth/poses.csv" \
+  --after "$folder/after/truth/poses.csv"
