@@ -4,6 +4,8 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <type_traits>
+#include <utility>
 
 #include "camera_calib/projection_difference.h"
 
@@ -14,19 +16,6 @@ constexpr int kLeastPhotographs = 5;  // fewer say nothing of their own spread
 constexpr int kLeastKeys = 10;
 constexpr int kCellsAcross = 12;
 constexpr int kCellsDown = 8;
-
-// Numbers 0, 1, ... in the order of first use.
-template <typename Key>
-class Numbering {
- public:
-  int operator()(const Key& key) {
-    return numbers_.try_emplace(key, static_cast<int>(numbers_.size())).first->second;
-  }
-  [[nodiscard]] int count() const { return static_cast<int>(numbers_.size()); }
-
- private:
-  std::map<Key, int> numbers_;
-};
 
 int cell_of(const Eigen::Vector2d& px, const CameraModel& camera) {
   const auto along = [](double at, int length, int cells) {
@@ -43,44 +32,36 @@ double mean_variance(const CameraModel& camera, const Eigen::MatrixXd& covarianc
   return sum / static_cast<double>(uncertainty.covariance_px2.size());
 }
 
-// Keys of the system's rows.
-struct RowKeys {
-  std::vector<int> photograph, place, point;
-  int photographs = 0, places = 0, points = 0;
+// Rows of the system that share something, numbered 0, 1, ... in the order of first use.
+struct RowGroups {
+  std::vector<int> of_row;
+  int count = 0;
 };
 
-RowKeys keys_of(const std::vector<UsedFeature>& used, const CameraModel& camera) {
-  Numbering<int> photographs;
-  Numbering<int> places;
-  Numbering<std::pair<int, int>> points;
-  RowKeys keys;
+// `key` tells of a feature and one of its points what its rows share with others.
+template <typename KeyOf>
+RowGroups row_groups(const std::vector<UsedFeature>& used, const KeyOf& key) {
+  std::map<std::invoke_result_t<KeyOf, const UsedFeature&, int>, int> numbers;
+  RowGroups groups;
   for (const UsedFeature& at : used) {
     for (int i = 0; i < at.feature->points(); ++i) {
-      for (int axis = 0; axis < 2; ++axis) {
-        keys.photograph.push_back(photographs(at.photograph));
-        keys.place.push_back(places(cell_of(at.feature->px.segment<2>(2 * i), camera)));
-        keys.point.push_back(points({at.sheet, at.feature->first_point}));
-      }
+      const int number = numbers.try_emplace(key(at, i), static_cast<int>(numbers.size())).first->second;
+      groups.of_row.insert(groups.of_row.end(), 2, number);
     }
   }
-  keys.photographs = photographs.count();
-  keys.places = places.count();
-  keys.points = points.count();
-  return keys;
+  groups.count = static_cast<int>(numbers.size());
+  return groups;
 }
 
-std::optional<LeftOut> leave_photographs_out(const ReducedSystem& system,
-                                             const std::vector<UsedFeature>& used) {
-  Numbering<int> photographs;
-  std::vector<int> photograph_of_row;
-  for (const UsedFeature& at : used) {
-    photograph_of_row.insert(photograph_of_row.end(), static_cast<std::size_t>(2 * at.feature->points()),
-                             photographs(at.photograph));
-  }
-  if (photographs.count() < 2 || system.covariance.size() == 0) return std::nullopt;
+RowGroups photographs_of(const std::vector<UsedFeature>& used) {
+  return row_groups(used, [](const UsedFeature& at, int) { return at.photograph; });
+}
+
+std::optional<LeftOut> leave_photographs_out(const ReducedSystem& system, const RowGroups& photographs) {
+  if (photographs.count < 2 || system.covariance.size() == 0) return std::nullopt;
   std::vector<int> photograph_of_block;
   for (const ReducedBlock& block : system.blocks) {
-    photograph_of_block.push_back(photograph_of_row[static_cast<std::size_t>(block.rows.front())]);
+    photograph_of_block.push_back(photographs.of_row[static_cast<std::size_t>(block.rows.front())]);
   }
   return leave_groups_out(system, photograph_of_block);
 }
@@ -96,20 +77,27 @@ SharedErrorFactors shared_error_factors(
   const auto factor = [&](const Eigen::MatrixXd& covariance) {
     return std::sqrt(mean_variance(camera, camera_part(covariance)) / expected);
   };
-  const RowKeys keys = keys_of(used, camera);
+  const RowGroups photographs = photographs_of(used);
+  const RowGroups places = row_groups(used, [&camera](const UsedFeature& at, int i) {
+    return cell_of(at.feature->px.segment<2>(2 * i), camera);
+  });
+  const RowGroups points = row_groups(
+      used, [](const UsedFeature& at, int) { return std::pair(at.sheet, at.feature->first_point); });
   SharedErrorFactors out;
-  if (keys.photographs >= kLeastPhotographs) {
-    if (const auto left_out = leave_photographs_out(system, used)) {
+  if (photographs.count >= kLeastPhotographs) {
+    if (const auto left_out = leave_photographs_out(system, photographs)) {
       out.photographs = factor(jackknife_covariance(*left_out));
     }
   }
-  if (keys.places >= kLeastKeys) out.places = factor(clustered_covariance(system, keys.place, keys.places));
-  if (keys.points >= kLeastKeys) out.points = factor(clustered_covariance(system, keys.point, keys.points));
+  if (places.count >= kLeastKeys)
+    out.places = factor(clustered_covariance(system, places.of_row, places.count));
+  if (points.count >= kLeastKeys)
+    out.points = factor(clustered_covariance(system, points.of_row, points.count));
   return out;
 }
 
 std::vector<double> left_out_chi2(const ReducedSystem& system, const std::vector<UsedFeature>& used) {
-  const auto left_out = leave_photographs_out(system, used);
+  const auto left_out = leave_photographs_out(system, photographs_of(used));
   if (!left_out) return {};
   return {left_out->chi2.data(), left_out->chi2.data() + left_out->chi2.size()};
 }

@@ -68,13 +68,10 @@ TEST_F(Compensate, PrintsAllMethodsAndWritesTheFiles) {
   for (const char* name : {"model.yaml", "predicted_poses.csv", "actuators.csv"})
     EXPECT_TRUE(std::filesystem::exists(folder_.path() / "out" / name)) << name;
   // The same input gives the same bytes.
-  const auto contents = [&] {
-    std::ifstream in(folder_.path() / "out/model.yaml");
-    return std::string(std::istreambuf_iterator<char>(in), {});
-  };
-  const std::string first = contents();
+  const std::filesystem::path model = folder_.path() / "out/model.yaml";
+  const std::string first = contents(model);
   (void)run(table(1.5, 0.3), table(0, 0));
-  EXPECT_EQ(contents(), first);
+  EXPECT_EQ(contents(model), first);
 }
 
 TEST_F(Compensate, RefusesInOneClearLine) {

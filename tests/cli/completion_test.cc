@@ -23,8 +23,7 @@ std::string shell_output(const std::string& command, const std::string& input) {
   const std::string out = (folder.path() / "out").string();
   std::ofstream(in) << input;
   EXPECT_EQ(std::system((command + " <" + in + " >" + out + " 2>&1").c_str()), 0) << command;
-  std::ifstream file(out);
-  return {std::istreambuf_iterator<char>(file), {}};
+  return contents(out);
 }
 
 TEST(Completion, BashOffersCommandsOptionsAndChoices) {

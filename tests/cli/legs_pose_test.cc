@@ -23,11 +23,6 @@ struct Lab {
   TemporaryFolder folder;
 };
 
-std::string contents(const std::string& path) {
-  std::ifstream in(path);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
 TEST(LegsAndPose, UndoEachOther) {
   const Lab lab;
   const CommandResult legs = run_hexcal({"legs", "--hexapod", lab.file("h.yaml"), "--poses",

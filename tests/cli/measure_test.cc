@@ -12,11 +12,6 @@ namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-std::string contents(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
 // Home and one pose of the sample campaign, with one thing spoilt by the test.
 class Measure : public ::testing::Test {
  protected:

@@ -105,12 +105,8 @@ TEST(Page, WorksInAHeadlessBrowserWithoutConsoleErrors) {
       (folder.path() / "profile").string() + "' --dump-dom 'file://" + file + "' >'" +
       (folder.path() / "dom").string() + "' 2>'" + (folder.path() / "log").string() + "'";
   ASSERT_EQ(std::system(command.c_str()), 0);
-  const auto read = [&](const char* name) {
-    std::ifstream in(folder.path() / name);
-    return std::string(std::istreambuf_iterator<char>(in), {});
-  };
-  EXPECT_THAT(read("dom"), HasSubstr("data-probe=\"a c descending true 2\""));
-  EXPECT_THAT(read("log"), Not(HasSubstr("CONSOLE")));
+  EXPECT_THAT(contents(folder.path() / "dom"), HasSubstr("data-probe=\"a c descending true 2\""));
+  EXPECT_THAT(contents(folder.path() / "log"), Not(HasSubstr("CONSOLE")));
 }
 
 }  // namespace

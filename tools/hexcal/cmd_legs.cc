@@ -10,6 +10,7 @@
 #include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/csv_table.h"
+#include "tools/io/pose_table.h"
 #include "tools/io/row_stream.h"
 
 namespace hexcal {
@@ -56,7 +57,7 @@ int run_legs(const LegsFlags& flags) {
     return kSomeFailed;
   }
   RowTransform transform;
-  transform.columns = {"x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg"};
+  transform.columns.assign(kPoseColumns.begin(), kPoseColumns.end());
   transform.header = "pose,status,q1,q2,q3,q4,q5,q6\n";
   transform.row = [&machine](const StreamedRow& row, std::string& out) {
     const Answer answer = solve(machine, pose_from_mm_deg(Eigen::Map<const Vector6d>(row.numbers.data())));

@@ -70,7 +70,7 @@ PoseMargins margins_of(const WorkspaceFlags& flags) {
 
 int judge_table(const WorkspaceFlags& flags, const Machine& machine) {
   RowTransform transform;
-  transform.columns = {"x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg"};
+  transform.columns.assign(kPoseColumns.begin(), kPoseColumns.end());
   transform.header = std::string("pose,") + kColumns;
   transform.row = [&machine](const StreamedRow& row, std::string& out) {
     const Pose pose = pose_from_mm_deg(Eigen::Map<const Vector6d>(row.numbers.data()));

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "tools/io/pose_table.h"
+
 namespace hexcal {
 namespace {
 
@@ -42,8 +44,6 @@ constexpr std::array kAll{PoseVerdict::reachable,       PoseVerdict::too_short,
                           PoseVerdict::too_long,        PoseVerdict::base_joint,
                           PoseVerdict::platform_joint,  PoseVerdict::legs_collide,
                           PoseVerdict::beyond_singular, PoseVerdict::near_singular};
-
-constexpr std::array kAxes{"x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg"};
 
 double shown(int axis, double value) { return axis < 3 ? value : value * kDegPerRad; }
 
@@ -115,16 +115,16 @@ std::string slice_picture(const std::vector<SliceCell>& cells, const SliceOption
   const Vector6d centre = options.centre.vector();
   for (int k = 0; k < 6; ++k) {
     if (k == options.axis_u || k == options.axis_v) continue;
-    others += fmt::format("{}{} {:g}", others.empty() ? "at " : ", ", kAxes[static_cast<std::size_t>(k)],
-                          shown(k, centre[k]));
+    others += fmt::format("{}{} {:g}", others.empty() ? "at " : ", ",
+                          kPoseColumns[static_cast<std::size_t>(k)], shown(k, centre[k]));
   }
   svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n", kLeft + kSide / 2,
                      kTop - 10, others);
   svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n", kLeft + kSide / 2,
-                     kTop + kSide + 42, kAxes[static_cast<std::size_t>(options.axis_u)]);
+                     kTop + kSide + 42, kPoseColumns[static_cast<std::size_t>(options.axis_u)]);
   svg +=
       fmt::format("<text transform=\"translate(18 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
-                  kTop + kSide / 2, kAxes[static_cast<std::size_t>(options.axis_v)]);
+                  kTop + kSide / 2, kPoseColumns[static_cast<std::size_t>(options.axis_v)]);
   double y = kTop + 10;
   for (const PoseVerdict verdict : kAll) {
     svg += fmt::format(

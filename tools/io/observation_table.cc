@@ -62,8 +62,7 @@ PoseObservation read_row(const CsvTable& table, std::size_t row) {
   for (std::size_t i = 0; i < 6; ++i) {
     pose.observed[i] = table.has_column(kPoseColumns[i]) && !table.text(row, kPoseColumns[i]).empty();
     if (pose.observed[i])
-      v[static_cast<Eigen::Index>(i)] =
-          table.number(row, kPoseColumns[i]) * pose_column_unit(static_cast<Eigen::Index>(i));
+      v[static_cast<Eigen::Index>(i)] = table.number(row, kPoseColumns[i]) * pose_column_unit(i);
   }
   pose.measured = Pose::from_vector(v);
   return pose;
@@ -79,7 +78,7 @@ bool read_sigma(const CsvTable& table, std::size_t row, PoseObservation& pose) {
     const auto value = table.has_column(column) ? table.optional_number(row, column) : std::nullopt;
     if (!value) return false;
     if (*value < 0) table.fail(row, column, fmt::format("found {}, wanted 0 or more", *value));
-    sigma[k] = *value * pose_column_unit(static_cast<Eigen::Index>(i));
+    sigma[k] = *value * pose_column_unit(i);
   }
   pose.covariance = sigma.cwiseAbs2().asDiagonal();
   return true;

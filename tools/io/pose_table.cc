@@ -55,8 +55,7 @@ std::vector<PoseRecord> read_pose_table(const std::filesystem::path& path) {
       for (std::size_t i = 0; i < 6; ++i) {
         const auto value = table.optional_number(row, fmt::format("sigma_{}", kPoseColumns[i]));
         complete = complete && value.has_value();
-        sigma[static_cast<Eigen::Index>(i)] =
-            value.value_or(0.0) * pose_column_unit(static_cast<Eigen::Index>(i));
+        sigma[static_cast<Eigen::Index>(i)] = value.value_or(0.0) * pose_column_unit(i);
       }
       if (complete) record.sigma = sigma;
     }
@@ -86,18 +85,16 @@ std::string format_pose_table(const std::string& head, const std::vector<PoseRec
     for (std::size_t i = 0; i < 6; ++i) {
       out += ',';
       if (record.pose) {
-        out += fmt::format("{:.{}f}",
-                           record.pose->vector()[static_cast<Eigen::Index>(i)] /
-                               pose_column_unit(static_cast<Eigen::Index>(i)),
-                           i < 3 ? 6 : 7);
+        out +=
+            fmt::format("{:.{}f}", record.pose->vector()[static_cast<Eigen::Index>(i)] / pose_column_unit(i),
+                        i < 3 ? 6 : 7);
       }
     }
     if (measured) {
       for (std::size_t i = 0; i < 6; ++i) {
         out += ',';
         if (record.sigma)
-          out += fmt::format("{:.4g}", (*record.sigma)[static_cast<Eigen::Index>(i)] /
-                                           pose_column_unit(static_cast<Eigen::Index>(i)));
+          out += fmt::format("{:.4g}", (*record.sigma)[static_cast<Eigen::Index>(i)] / pose_column_unit(i));
       }
       out += fmt::format(",{},{},", record.images.value_or(0), record.markers.value_or(0));
       if (record.rms_px) out += fmt::format("{:.4f}", *record.rms_px);

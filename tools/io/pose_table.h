@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -11,10 +12,10 @@
 
 namespace hexcal {
 
-/// Columns of a pose in every table, in the order of Pose::vector(), and of the actuator readings.
+/// Columns of a pose in every table, in the order of Pose::vector().
 inline constexpr std::array kPoseColumns{"x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg"};
 /// What one of column i of a pose is in mm or rad: files carry degrees, memory carries radians.
-[[nodiscard]] constexpr double pose_column_unit(Eigen::Index i) { return i < 3 ? 1.0 : kRadPerDeg; }
+[[nodiscard]] constexpr double pose_column_unit(std::size_t i) { return i < 3 ? 1.0 : kRadPerDeg; }
 
 /// One row of targets.csv, poses.csv or predicted_poses.csv. Absent columns are absent here.
 struct PoseRecord {

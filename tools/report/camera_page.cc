@@ -166,7 +166,7 @@ Chart radial_residual_chart(const SheetAdjustmentResult& fit) {
 }
 
 Chart strip_chart(const std::vector<PhotographRow>& rows) {
-  Series rms{"rms", Series::Kind::bars, Ink::series0, {}, {}, {}, {}, false};
+  Series rms{"", Series::Kind::bars, Ink::series0, {}, {}, {}, {}, false};
   Panel panel;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     panel.x.categories.push_back(fmt::format("{}", i + 1));
@@ -176,7 +176,6 @@ Chart strip_chart(const std::vector<PhotographRow>& rows) {
                                                   rows[i].tilt_deg)
                                     : fmt::format("{}: {}", rows[i].name, rows[i].status));
   }
-  rms.name.clear();
   panel.x.title = "photograph";
   panel.y.title = "residuals (px rms)";
   panel.series = {rms};
@@ -186,13 +185,6 @@ Chart strip_chart(const std::vector<PhotographRow>& rows) {
   chart.panels = {panel};
   chart.panel_size = {760, 220};
   return chart;
-}
-
-HtmlCell text_cell(std::string text, Light light = Light::none) {
-  HtmlCell cell;
-  cell.text = std::move(text);
-  cell.light = light;
-  return cell;
 }
 
 HtmlTable photograph_table(const std::vector<PhotographRow>& rows) {

@@ -95,6 +95,13 @@ const char* light_words(Light light) {
   return "";
 }
 
+HtmlCell text_cell(std::string text, Light light) {
+  HtmlCell cell;
+  cell.text = std::move(text);
+  cell.light = light;
+  return cell;
+}
+
 HtmlCell number_cell(double value, int decimals) {
   if (!std::isfinite(value)) return {};
   HtmlCell cell;

@@ -38,6 +38,8 @@ struct HtmlCell {
   std::string hint;    ///< shown when pointed at
   std::string second;  ///< second line, small: a standard deviation
 };
+/// A cell with words.
+[[nodiscard]] HtmlCell text_cell(std::string text, Light light = Light::none);
 /// A number that is not there: number_cell shows it as an empty cell.
 inline constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 /// A cell with a number shown to `decimals` places, sorted by its value; NaN is an empty cell.

@@ -10,12 +10,6 @@
 namespace hexcal {
 namespace {
 
-HtmlCell words_cell(const std::string& text) {
-  HtmlCell cell;
-  cell.text = text;
-  return cell;
-}
-
 // "leg 3 base x" belongs to leg 3; 0: no leg's.
 int leg_of(const std::string& name) {
   if (!name.starts_with("leg ") || name.size() < 5) return 0;
@@ -39,9 +33,9 @@ HtmlTable parameter_table(const Identifiability& identified, const std::string& 
     const double ratio = parameter.sigma > 0 ? parameter.value / parameter.sigma : 0;
     HtmlCell significance = number_cell(ratio, 1);
     if (std::abs(ratio) > 3) significance.light = Light::warning;
-    table.rows.push_back({words_cell(parameter.name), number_cell(parameter.value, 4),
+    table.rows.push_back({text_cell(parameter.name), number_cell(parameter.value, 4),
                           number_cell(parameter.sigma, 4), significance, number_cell(parameter.tolerance, 3),
-                          words_cell(parameter.unit)});
+                          text_cell(parameter.unit)});
   }
   return table;
 }
@@ -108,7 +102,7 @@ Html machine_section(const CompensationPart& part) {
                      {"gain", "", true, "tolerance over sigma of the data; below 1 the tolerance decides"}};
     for (const WeakDirection& weak : identifiability.weak) {
       table.rows.push_back(
-          {words_cell(fmt::format("{}", fmt::join(weak.parameters, ", "))), number_cell(weak.gain, 2)});
+          {text_cell(fmt::format("{}", fmt::join(weak.parameters, ", "))), number_cell(weak.gain, 2)});
     }
     out += html_table(table);
   }
@@ -117,7 +111,7 @@ Html machine_section(const CompensationPart& part) {
     table.caption = "Parameters that the poses can hardly tell apart";
     table.columns = {{"one", "", false, ""}, {"other", "", false, ""}, {"correlation", "", true, ""}};
     for (const CorrelatedPair& pair : identifiability.correlations) {
-      table.rows.push_back({words_cell(pair.a), words_cell(pair.b), number_cell(pair.correlation, 3)});
+      table.rows.push_back({text_cell(pair.a), text_cell(pair.b), number_cell(pair.correlation, 3)});
     }
     out += html_table(table);
   }
