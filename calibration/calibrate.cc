@@ -108,18 +108,17 @@ void require_poses(const ObservationSet& observations) {
                     count, kFewestPoses));
   if (spread == 0) throw InputError("all measured poses have the same readings, wanted different poses");
   // Level poses determine 24 of 42 numbers, and none of what tilts the platform.
-  double tilt_rad = 0;
+  double most_tilt_rad = 0;
   for (const PoseObservation& pose : observations.poses) {
     if (pose.is_definition || !pose.target) continue;
-    const Eigen::Vector3d z = quaternion_from_rpy(pose.target->rpy_rad) * Eigen::Vector3d::UnitZ();
-    tilt_rad = std::max(tilt_rad, std::atan2(z.head<2>().norm(), z.z()));
+    most_tilt_rad = std::max(most_tilt_rad, tilt_rad(*pose.target));
     targets = true;
   }
-  if (targets && tilt_rad < kLeastTiltDeg * kRadPerDeg)
+  if (targets && most_tilt_rad < kLeastTiltDeg * kRadPerDeg)
     throw InputError(
         fmt::format("all poses are level (tilted by at most {:.2f} deg), wanted some tilted about x and y by "
                     "several degrees",
-                    tilt_rad * kDegPerRad));
+                    most_tilt_rad * kDegPerRad));
 }
 
 }  // namespace

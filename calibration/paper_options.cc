@@ -1,11 +1,11 @@
 #include "calibration/paper_options.h"
 
 #include <Eigen/SVD>
-#include <algorithm>
 #include <cassert>
 #include <cmath>
 
 #include "kinematics/dh_chain.h"
+#include "kinematics/geometry/median.h"
 
 namespace hexcal {
 namespace {
@@ -38,13 +38,6 @@ ErrorLine least_squares(const std::vector<Sample>& samples, ErrorCurve curve) {
 }
 
 bool usable(const PoseObservation& pose) { return pose.target && pose.complete() && !pose.is_definition; }
-
-double median(std::vector<double> values) {
-  assert(!values.empty());
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double stiffness_of_weakest_motion(const PlatformGeometry& geometry, const Pose& pose) {
   Matrix6d jacobian = leg_jacobian(geometry, geometry.B_from_P(pose));

@@ -201,10 +201,6 @@ std::vector<Pose> planning_candidates(const PlatformGeometry& nominal, std::size
   const Vector6d half = 0.5 * (box.upper - box.lower);
   std::mt19937_64 rng(seed);
   const auto centred = [&rng] { return static_cast<double>(rng()) * 0x1p-63 - 1; };
-  const auto tilt_rad = [](const Pose& pose) {
-    const Eigen::Vector3d z = quaternion_from_rpy(pose.rpy_rad) * Eigen::Vector3d::UnitZ();
-    return std::atan2(z.head<2>().norm(), z.z());
-  };
   std::vector<Pose> poses;
   for (std::size_t attempt = 0; attempt < 20 * count && poses.size() < count; ++attempt) {
     Vector6d direction;

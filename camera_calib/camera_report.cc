@@ -6,17 +6,11 @@
 
 #include "camera_calib/camera_advice.h"
 #include "camera_calib/choose_model.h"
+#include "kinematics/geometry/median.h"
 #include "kinematics/geometry/pose.h"
 
 namespace hexcal {
 namespace {
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double blur_of(const SheetPhotograph& photograph) {
   std::vector<double> blurs;

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "kinematics/geometry/covariance.h"
+#include "kinematics/geometry/median.h"
 
 namespace hexcal {
 namespace {
@@ -54,12 +55,6 @@ Eigen::Matrix3d weight_of(const DatumPoint& point, const Rigid3& frame_from_body
   return (point.nominal->sigma_mm * point.nominal->sigma_mm * Eigen::Matrix3d::Identity() +
           r * point.covariance * r.transpose())
       .inverse();
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Start from every triple of a few spread points; the one with the least median residual wins, so that up to

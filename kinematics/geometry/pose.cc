@@ -24,6 +24,11 @@ double wrap_angle(double angle_rad) { return std::remainder(angle_rad, 360.0 * k
 
 Rigid3 home_from_lg(const Pose& pose) { return {quaternion_from_rpy(pose.rpy_rad), pose.position_mm}; }
 
+double tilt_rad(const Pose& pose) {
+  const Eigen::Vector3d z = quaternion_from_rpy(pose.rpy_rad) * Eigen::Vector3d::UnitZ();
+  return std::atan2(z.head<2>().norm(), z.z());
+}
+
 Pose pose_from_home_from_lg(const Rigid3& home_from_LG) {
   return {home_from_LG.translation, rpy_from_quaternion(home_from_LG.rotation)};
 }

@@ -44,6 +44,10 @@ struct Pose {
 [[nodiscard]] Rigid3 ug_from_lg(const Pose& pose, double gd_mm);
 [[nodiscard]] Pose pose_from_ug_from_lg(const Rigid3& UG_from_LG, double gd_mm);
 
+/// Angle by which the z axis of the lower grip turns away from where it points at home, 0 to pi; turning
+/// about z is no tilt.
+[[nodiscard]] double tilt_rad(const Pose& pose);
+
 /// Error of a pose = actual minus target per parameter, angles wrapped to +-pi.
 [[nodiscard]] Vector6d pose_error(const Pose& actual, const Pose& target);
 

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/geometry/median.h"
 #include "photogrammetry/adjustment/adjustment_statistics.h"
 #include "photogrammetry/adjustment/bundle_solver.h"
 #include "photogrammetry/adjustment/initial_network.h"
@@ -46,13 +47,6 @@ struct Stage {
   bool converged = false;
   int iterations = 0;
 };
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 Eigen::MatrixXd symmetric_inverse(const Eigen::MatrixXd& m) {
   const Eigen::VectorXd scale = m.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();

@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/geometry/median.h"
 #include "photogrammetry/markers/marker_decoder.h"
 #include "photogrammetry/markers/marker_verdict.h"
 #include "photogrammetry/markers/quad_finder.h"
@@ -113,12 +114,6 @@ MarkerObservation observation_as_read(const DecodedMarker& marker, MarkerStatus 
   observation.corners_px = marker.corners_px;
   observation.side_px = side_of(marker);
   return observation;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // All markers' evidence about the tone curve and the lens stand-in together (their fits' Schur complements).

@@ -41,12 +41,6 @@ std::vector<Pose> poses_of(const fs::path& path, std::vector<std::string>* ids =
   return poses;
 }
 
-// Angle by which a pose tips the markers away from where they look at home.
-double tilt_deg(const Pose& pose) {
-  const Eigen::Vector3d z = quaternion_from_rpy(pose.rpy_rad) * Eigen::Vector3d::UnitZ();
-  return std::atan2(z.head<2>().norm(), z.z()) * kDegPerRad;
-}
-
 int run_plan(PlanFlags flags) {
   constexpr std::size_t kCandidates = 2000;
   if (!flags.campaign.empty()) {
@@ -66,7 +60,7 @@ int run_plan(PlanFlags flags) {
     candidates = poses_of(flags.candidates, &ids);
   }
   for (std::size_t i = candidates.size(); i-- > 0;) {
-    if (tilt_deg(candidates[i]) <= flags.max_tilt_deg) continue;
+    if (tilt_rad(candidates[i]) * kDegPerRad <= flags.max_tilt_deg) continue;
     candidates.erase(candidates.begin() + static_cast<std::ptrdiff_t>(i));
     if (!ids.empty()) ids.erase(ids.begin() + static_cast<std::ptrdiff_t>(i));
   }

@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
 
 #include "kinematics/forward.h"
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/geometry/median.h"
 #include "kinematics/inverse.h"
 #include "tools/io/csv_table.h"
 #include "tools/io/pose_table.h"
@@ -24,12 +24,6 @@ constexpr double kGuessedSigmaMm = 0.1;
 constexpr double kGuessedSigmaDeg = 0.03;
 // The joint covariance is dense: 6N x 6N.
 constexpr std::size_t kMostJointPoses = 1000;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 struct Legs {
   LegVector readings;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kinematics/geometry/median.h"
 #include "tools/report/campaign_report.h"
 #include "tools/report/markup.h"
 
@@ -14,13 +15,6 @@ double orientation_sigma(const PoseRecord& record) { return record.sigma->tail<3
 
 // A pose that defines a frame has no sigma of its own and says nothing about the others'.
 bool has_sigma(const PoseRecord& record) { return record.sigma && position_sigma(record) > 0; }
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 template <typename Value>
 double median_of(const std::vector<PoseRecord>& poses, Value value) {
