@@ -38,6 +38,16 @@ Eigen::VectorXd scales(const IdentifyResult& identified) {
   return scale;
 }
 
+// The free parameters but for the common curve: with the legs' own curves it says the same thing twice.
+std::vector<Eigen::Index> without_common_curve(const IdentifyResult& identified,
+                                               const std::vector<int>& leader) {
+  std::vector<Eigen::Index> kept;
+  for (std::size_t j = 0; j < leader.size(); ++j)
+    if (parameter_kind(identified.layout, leader[j]) != ParameterKind::common_curve)
+      kept.push_back(static_cast<Eigen::Index>(j));
+  return kept;
+}
+
 int count_determined(const Eigen::MatrixXd& information, const Eigen::VectorXd& scale) {
   const Solver solver(scale.asDiagonal() * information * scale.asDiagonal(), Eigen::EigenvaluesOnly);
   return static_cast<int>((solver.eigenvalues().array() > 1.0).count());
@@ -64,7 +74,7 @@ std::vector<PoseFamily> pose_families(double move_mm, double turn_rad) {
 }
 
 std::string advise(const PlatformGeometry& nominal, const IdentifyResult& identified,
-                   const Eigen::VectorXd& scale, int determined) {
+                   const std::vector<Eigen::Index>& kept, const Eigen::VectorXd& scale, int determined) {
   const double length = characteristic_length_mm(nominal);
   std::string best_words;
   int best = determined;
@@ -92,13 +102,14 @@ std::string advise(const PlatformGeometry& nominal, const IdentifyResult& identi
     }
     const NormalEquations more =
         normal_equations(reduced, observations, std::vector<double>(reduced.size(), 1.0), noise);
-    const int gained = count_determined(identified.data_information + more.information, scale);
+    const Eigen::MatrixXd together = identified.data_information + more.information;
+    const int gained = count_determined(together(kept, kept), scale);
     if (gained > best) {
       best = gained;
       best_words = family.words;
     }
   }
-  const int weak = identified.selection.free_count - determined;
+  const int weak = static_cast<int>(kept.size()) - determined;
   if (weak == 0) return "";
   if (best_words.empty())
     return fmt::format(
@@ -182,11 +193,8 @@ std::vector<LegDiagnosis> diagnose_legs(const IdentifyResult& identified) {
 
 Identifiability judge_identifiability(const PlatformGeometry& nominal, const IdentifyResult& identified) {
   Identifiability judged;
-  const Eigen::MatrixXd& information = identified.data_information;
-  const Eigen::Index n = information.rows();
-  judged.free_parameters = static_cast<int>(n);
   const std::vector<int> leader = leaders(identified);
-  for (Eigen::Index j = 0; j < n; ++j) {
+  for (Eigen::Index j = 0; j < identified.covariance.rows(); ++j) {
     const int i = leader[static_cast<std::size_t>(j)];
     const double factor = parameter_unit_factor(identified.layout, i);
     judged.parameters.push_back({parameter_name(identified.layout, i), parameter_unit(identified.layout, i),
@@ -194,7 +202,11 @@ Identifiability judge_identifiability(const PlatformGeometry& nominal, const Ide
                                  factor * std::sqrt(identified.covariance(j, j)),
                                  factor * identified.tolerances[j]});
   }
-  const Eigen::VectorXd scale = scales(identified);
+  const std::vector<Eigen::Index> kept = without_common_curve(identified, leader);
+  const Eigen::MatrixXd information = identified.data_information(kept, kept);
+  const Eigen::Index n = information.rows();
+  judged.free_parameters = static_cast<int>(n);
+  const Eigen::VectorXd scale = scales(identified)(kept);
   // Of a number that moves nothing that was measured only rounding is left, which must not be scaled up.
   Eigen::VectorXd length = Eigen::VectorXd::Zero(n);
   for (Eigen::Index j = 0; j < n; ++j)
@@ -218,14 +230,15 @@ Identifiability judge_identifiability(const PlatformGeometry& nominal, const Ide
       std::stable_sort(order.begin(), order.end(),
                        [&](Eigen::Index a, Eigen::Index b) { return shares[a] > shares[b] + 1e-9; });
       for (std::size_t k = 0; k < std::min<std::size_t>(4, order.size()); ++k)
-        direction.parameters.push_back(judged.parameters[static_cast<std::size_t>(order[k])].name);
+        direction.parameters.push_back(
+            judged.parameters[static_cast<std::size_t>(kept[static_cast<std::size_t>(order[k])])].name);
       judged.weak.push_back(direction);
     }
   }
-  judged.advice = advise(nominal, identified, scale, judged.determined);
+  judged.advice = advise(nominal, identified, kept, scale, judged.determined);
 
-  for (Eigen::Index a = 0; a < n; ++a) {
-    for (Eigen::Index b = a + 1; b < n; ++b) {
+  for (Eigen::Index a = 0; a < identified.covariance.rows(); ++a) {
+    for (Eigen::Index b = a + 1; b < identified.covariance.rows(); ++b) {
       const double r =
           identified.covariance(a, b) / std::sqrt(identified.covariance(a, a) * identified.covariance(b, b));
       if (std::abs(r) > 0.95)

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "calibration/frame_alignment.h"
+#include "calibration/free_parameters.h"
 #include "calibration/normal_equations.h"
 #include "kinematics/geometry/covariance.h"
 #include "kinematics/geometry/input_error.h"
@@ -25,71 +26,27 @@ constexpr int kMinPosesForRobust = 10;
 // noise or a tolerance (logarithm) that counts as none.
 constexpr double kSmallShare = 0.02;
 constexpr double kSettled = 0.02;
-// How far frames may move in one step where nothing holds them: wider than any knowledge.
-constexpr double kFrameStepMm = 1000;
-constexpr double kFrameStepRad = 1;
 
-double tolerance_of(const Tolerances& t, const ParameterLayout& layout, int index) {
-  switch (parameter_kind(layout, index)) {
-    case ParameterKind::joint:
-      return t.joint_mm;
-    case ParameterKind::offset:
-      return t.offset_mm;
-    case ParameterKind::scale:
-      return t.scale;
-    case ParameterKind::lead:
-      return t.lead_mm;
-    case ParameterKind::frame:
-      return kInfinity;
-    case ParameterKind::curve:
-      return t.curve_mm;
-    case ParameterKind::sag:
-      return index == layout.sag() ? t.sag_mm : t.sag_mm * 100.0;
-    case ParameterKind::backlash:
-      return t.backlash_mm;
-  }
-  return kInfinity;
-}
-
-bool is_free(const IdentifyOptions& options, const ParameterLayout& layout, int index) {
-  switch (parameter_kind(layout, index)) {
-    case ParameterKind::joint:
-      return options.geometry;
-    case ParameterKind::offset:
-      return true;
-    case ParameterKind::scale:
-      return options.scales;
-    case ParameterKind::lead:
-      return options.screw_lead;
-    case ParameterKind::frame:
-      return options.frames_unknown;
-    case ParameterKind::curve:
-      return true;
-    case ParameterKind::sag:
-      return options.sag;
-    case ParameterKind::backlash:
-      return options.backlash;
-  }
-  return false;
-}
-
-ParameterSelection select(const IdentifyOptions& options, const ParameterLayout& layout) {
-  ParameterSelection selection;
-  selection.free_of.assign(static_cast<std::size_t>(layout.size()), -1);
-  std::vector<int> leader_of_tie(options.tied.size(), -1);
-  for (int i = 0; i < layout.size(); ++i) {
-    const std::string parameter = parameter_name(layout, i);
-    if (!is_free(options, layout, i) || options.fixed.count(parameter) != 0) continue;
-    int& free = selection.free_of[static_cast<std::size_t>(i)];
-    for (std::size_t tie = 0; tie < options.tied.size(); ++tie) {
-      const auto& names = options.tied[tie];
-      if (std::find(names.begin(), names.end(), parameter) == names.end()) continue;
-      if (leader_of_tie[tie] < 0) leader_of_tie[tie] = selection.free_count++;
-      free = leader_of_tie[tie];
+// Curves of all legs run over the same part of the stroke, the part that any leg used: only so have they
+// something in common.
+Eigen::Matrix<double, 6, 2> stroke_range_of(const PlatformGeometry& nominal,
+                                            const ObservationSet& observations) {
+  double low = kInfinity;
+  double high = -kInfinity;
+  for (const PoseObservation& pose : observations.poses) {
+    const LegVector lengths = lengths_from_readings(nominal, pose.readings);
+    for (std::size_t k = 0; k < 6; ++k) {
+      const double stroke = lengths[static_cast<Eigen::Index>(k)] - nominal.actuators[k].min_mm;
+      low = std::min(low, stroke);
+      high = std::max(high, stroke);
     }
-    if (free < 0) free = selection.free_count++;
   }
-  return selection;
+  LegVector shortest;
+  for (std::size_t k = 0; k < 6; ++k) shortest[static_cast<Eigen::Index>(k)] = nominal.actuators[k].min_mm;
+  Eigen::Matrix<double, 6, 2> range;
+  range << readings_from_lengths(nominal, shortest + LegVector::Constant(low)),
+      readings_from_lengths(nominal, shortest + LegVector::Constant(high));
+  return range;
 }
 
 // The state of one identification.
@@ -101,31 +58,16 @@ class Identification {
     nominal_.geometry = nominal;
     if (options.screw_lead && !nominal.screw)
       nominal_.geometry.screw = screw_with_tangential_axes(nominal, 0.0);
-    result_.layout.curve_terms = options.curve_terms;
-    result_.selection = select(options, result_.layout);
+    const FreeParameters free = free_parameters(options);
+    result_.layout = free.layout;
+    result_.selection = free.selection;
+    result_.tolerances = initial_tolerances_ = free.tolerances;
+    kinds_ = free.kinds;
+    frame_steps_ = free.widest;
     result_.corrections.setZero(result_.layout.size());
     result_.weights.assign(observations.poses.size(), 1.0);
-    result_.tolerances.setConstant(free_count(), kInfinity);
-    frame_steps_.setZero(free_count());
-    kinds_.resize(static_cast<std::size_t>(free_count()));
-    for (int i = 0; i < result_.layout.size(); ++i) {
-      const int free = result_.selection.free_of[static_cast<std::size_t>(i)];
-      if (free < 0) continue;
-      result_.tolerances[free] = tolerance_of(options.tolerances, result_.layout, i);
-      kinds_[static_cast<std::size_t>(free)] = parameter_kind(result_.layout, i);
-      frame_steps_[free] =
-          std::string_view(parameter_unit(result_.layout, i)) == "deg" ? kFrameStepRad : kFrameStepMm;
-    }
-    initial_tolerances_ = result_.tolerances;
     noise_.leg_sigma_mm = options.leg_sigma_mm;
-    for (Eigen::Index k = 0; k < 6; ++k) {
-      result_.stroke_range(k, 0) = kInfinity;
-      result_.stroke_range(k, 1) = -kInfinity;
-      for (const PoseObservation& pose : observations.poses) {
-        result_.stroke_range(k, 0) = std::min(result_.stroke_range(k, 0), pose.readings[k]);
-        result_.stroke_range(k, 1) = std::max(result_.stroke_range(k, 1), pose.readings[k]);
-      }
-    }
+    result_.stroke_range = stroke_range_of(nominal, observations);
   }
 
   IdentifyResult run() {
@@ -299,8 +241,9 @@ class Identification {
       }
     }
     if (!adapt_tolerances_) return;
-    for (const ParameterKind kind : {ParameterKind::joint, ParameterKind::offset, ParameterKind::scale,
-                                     ParameterKind::curve, ParameterKind::sag, ParameterKind::backlash}) {
+    for (const ParameterKind kind :
+         {ParameterKind::joint, ParameterKind::offset, ParameterKind::scale, ParameterKind::curve,
+          ParameterKind::common_curve, ParameterKind::sag, ParameterKind::backlash}) {
       double determined = 0;
       double squares = 0;
       for (Eigen::Index j = 0; j < free_count(); ++j) {
@@ -395,34 +338,6 @@ class Identification {
 };
 
 }  // namespace
-
-void IdentifyOptions::validate() const {
-  const auto positive = [](double value, const char* field) {
-    if (!(value > 0)) throw InputError(fmt::format("{}: found {}, wanted more than 0", field, value));
-  };
-  positive(tolerances.joint_mm, "joint_mm");
-  positive(tolerances.offset_mm, "offset_mm");
-  positive(tolerances.scale, "scale");
-  positive(tolerances.lead_mm, "lead_mm");
-  positive(tolerances.curve_mm, "curve_mm");
-  positive(tolerances.sag_mm, "sag_mm");
-  positive(tolerances.backlash_mm, "backlash_mm");
-  positive(leg_sigma_mm, "leg_sigma_mm");
-  positive(max_iterations, "max_iterations");
-  if (curve_terms < 0 || curve_terms > 12)
-    throw InputError(fmt::format("curve_terms: found {}, wanted 0 to 12", curve_terms));
-  const ParameterLayout layout{curve_terms};
-  std::set<std::string> known;
-  for (int i = 0; i < layout.size(); ++i) known.insert(parameter_name(layout, i));
-  std::vector<std::vector<std::string>> named = tied;
-  named.emplace_back(fixed.begin(), fixed.end());
-  for (const auto& names : named) {
-    for (const std::string& parameter : names) {
-      if (known.count(parameter) == 0)
-        throw InputError(fmt::format("'{}' is no parameter, wanted for instance 'leg 1 base x'", parameter));
-    }
-  }
-}
 
 IdentifyResult identify(const PlatformGeometry& nominal, const ObservationSet& observations,
                         const IdentifyOptions& options) {

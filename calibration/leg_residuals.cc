@@ -34,11 +34,11 @@ LegLinearization linearize_legs(const MachineModel& machine, const MachineModel&
     out.jacobian(k, layout.backlash() + k) = -0.5 * approach[k];
     if (layout.curve_terms > 0) {
       const double half = 0.5 * (stroke_range(k, 1) - stroke_range(k, 0));
-      const double s = half > 0 ? std::clamp((readings[k] - center) / half, -1.0, 1.0) : 0.0;
+      const double s = half != 0 ? std::clamp((readings[k] - center) / half, -1.0, 1.0) : 0.0;
       const std::vector<double> terms = legendre_terms(s, static_cast<std::size_t>(layout.curve_terms));
       for (int j = 0; j < layout.curve_terms; ++j)
         out.jacobian(k, ParameterLayout::kCurves + layout.curve_terms * k + j) =
-            -terms[static_cast<std::size_t>(j)];
+            out.jacobian(k, layout.common_curve() + j) = -terms[static_cast<std::size_t>(j)];
     }
   }
   out.jacobian.middleCols<4>(layout.sag()) = -sag_basis(geometry, B_from_P);

@@ -25,10 +25,11 @@ std::string parameter_name(const ParameterLayout& layout, int index) {
     const int i = index - ParameterLayout::kBaseFrame;
     return fmt::format("{} frame {}", i < 6 ? "UG" : "LG", kFrameNames.at(static_cast<std::size_t>(i % 6)));
   }
-  if (index < layout.sag()) {
+  if (index < layout.common_curve()) {
     const int i = index - ParameterLayout::kCurves;
     return fmt::format("leg {} curve {}", i / layout.curve_terms + 1, i % layout.curve_terms + 2);
   }
+  if (index < layout.sag()) return fmt::format("common curve {}", index - layout.common_curve() + 2);
   if (index < layout.backlash()) return fmt::format("sag {}", index - layout.sag() + 1);
   return fmt::format("leg {} backlash", index - layout.backlash() + 1);
 }
@@ -40,7 +41,8 @@ ParameterKind parameter_kind(const ParameterLayout& layout, int index) {
   }
   if (index == ParameterLayout::kLead) return ParameterKind::lead;
   if (index < ParameterLayout::kCurves) return ParameterKind::frame;
-  if (index < layout.sag()) return ParameterKind::curve;
+  if (index < layout.common_curve()) return ParameterKind::curve;
+  if (index < layout.sag()) return ParameterKind::common_curve;
   return index < layout.backlash() ? ParameterKind::sag : ParameterKind::backlash;
 }
 
@@ -77,8 +79,9 @@ MachineModel corrected_machine(const MachineModel& nominal, const ParameterLayou
       curve.low = stroke_range(row, 0);
       curve.high = stroke_range(row, 1);
       const Eigen::Index first = ParameterLayout::kCurves + layout.curve_terms * row;
-      curve.coefficients_mm.assign(corrections.data() + first,
-                                   corrections.data() + first + layout.curve_terms);
+      const Eigen::VectorXd coefficients = corrections.segment(first, layout.curve_terms) +
+                                           corrections.segment(layout.common_curve(), layout.curve_terms);
+      curve.coefficients_mm.assign(coefficients.begin(), coefficients.end());
     }
   }
   if (geometry.screw) geometry.screw->lead_mm += corrections[ParameterLayout::kLead];

@@ -11,8 +11,9 @@ namespace hexcal {
 
 /// Numbers of a MachineModel that identification may change, as one vector of corrections to a nominal
 /// machine. Order: per leg base x y z, platform x y z (mm), offset at mid stroke (mm), scale (relative); then
-/// screw lead (mm), B_from_UG and P_from_LG (perturbations of covariance.h), stroke curves (per leg, mm), sag
-/// (4), backlash (6, mm).
+/// screw lead (mm), B_from_UG and P_from_LG (perturbations of covariance.h), stroke curves (per leg, mm), the
+/// part of these curves that all legs share (mm), sag (4), backlash (6, mm). Legs of one build have much of
+/// their curves in common; the shared part is what few poses can tell.
 struct ParameterLayout {
   static constexpr int kPerLeg = 8;
   static constexpr int kLegs = 6 * kPerLeg;
@@ -22,16 +23,17 @@ struct ParameterLayout {
   static constexpr int kCurves = kGripFrame + 6;
   int curve_terms = 0;  ///< Legendre terms per leg
 
-  [[nodiscard]] int sag() const { return kCurves + 6 * curve_terms; }
+  [[nodiscard]] int common_curve() const { return kCurves + 6 * curve_terms; }
+  [[nodiscard]] int sag() const { return common_curve() + curve_terms; }
   [[nodiscard]] int backlash() const { return sag() + 4; }
   [[nodiscard]] int size() const { return backlash() + 6; }
 };
 
 /// What kind of number a parameter is; parameters of a kind share a tolerance.
-enum class ParameterKind { joint, offset, scale, lead, frame, curve, sag, backlash };
+enum class ParameterKind { joint, offset, scale, lead, frame, curve, common_curve, sag, backlash };
 
-/// "leg 1 base x", "leg 6 scale", "screw lead", "UG frame x", "LG frame yaw", "leg 2 curve 3", "sag 1",
-/// "leg 4 backlash".
+/// "leg 1 base x", "leg 6 scale", "screw lead", "UG frame x", "LG frame yaw", "leg 2 curve 3", "common curve
+/// 3", "sag 1", "leg 4 backlash".
 [[nodiscard]] std::string parameter_name(const ParameterLayout& layout, int index);
 [[nodiscard]] ParameterKind parameter_kind(const ParameterLayout& layout, int index);
 /// "mm", "%" for scales, "deg" for rotations, "mm^2".

@@ -9,6 +9,7 @@
 #include <limits>
 #include <random>
 
+#include "calibration/free_parameters.h"
 #include "calibration/leg_residuals.h"
 #include "calibration/normal_equations.h"
 #include "kinematics/geometry/input_error.h"
@@ -23,28 +24,21 @@ using Whitened = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 // Whitened Jacobians of poses by the free parameters, these in units of their tolerances.
 class Design {
  public:
-  Design(const PlatformGeometry& nominal, const PlanOptions& options) : nominal_(nominal), options_(options) {
-    // Layout, selection and tolerances are those that identification itself would use: it is asked with one
-    // perfect pose.
-    ObservationSet one;
-    PoseObservation home;
-    home.readings = readings_at(nominal, nominal.home_B_from_P());
-    home.target = Pose{};
-    home.covariance = variance().asDiagonal();
-    one.poses.push_back(home);
-    IdentifyOptions identify_options = options.identify;
-    identify_options.frames_unknown = false;
-    identify_options.adapt_tolerances = false;
-    identified_ = identify(nominal, one, identify_options);
-    for (Eigen::Index k = 0; k < 6; ++k) {
-      const Actuator& actuator = nominal.actuators[static_cast<std::size_t>(k)];
-      const double a = (actuator.min_mm - actuator.offset_mm) / actuator.mm_per_unit;
-      const double b = (actuator.max_mm - actuator.offset_mm) / actuator.mm_per_unit;
-      identified_.stroke_range.row(k) << std::min(a, b), std::max(a, b);
+  Design(const PlatformGeometry& nominal, const PlanOptions& options)
+      : nominal_(nominal),
+        options_(options),
+        free_(free_parameters(options.identify)),
+        scales_(free_.tolerances.cwiseMin(free_.widest)) {
+    LegVector shortest;
+    LegVector longest;
+    for (std::size_t k = 0; k < 6; ++k) {
+      shortest[static_cast<Eigen::Index>(k)] = nominal.actuators[k].min_mm;
+      longest[static_cast<Eigen::Index>(k)] = nominal.actuators[k].max_mm;
     }
+    stroke_range_ << readings_from_lengths(nominal, shortest), readings_from_lengths(nominal, longest);
   }
 
-  Eigen::Index parameters() const { return identified_.selection.free_count; }
+  Eigen::Index parameters() const { return free_.selection.free_count; }
 
   Whitened measured(const Pose& pose) const {
     const auto [reduced, by_pose] = reduced_at(pose);
@@ -70,18 +64,18 @@ class Design {
 
   std::pair<Whitened, Matrix6d> reduced_at(const Pose& pose) const {
     const MachineModel machine{.geometry = nominal_};
-    const LegLinearization legs =
-        linearize_legs(machine, machine, identified_.layout, identified_.stroke_range, pose,
-                       machine_readings(machine, pose), LegVector::Zero());
-    ReducedPose reduced =
-        reduce_to_observed(legs, {true, true, true, true, true, true}, identified_.selection);
-    reduced.jacobian *= identified_.tolerances.asDiagonal();
+    const LegLinearization legs = linearize_legs(machine, machine, free_.layout, stroke_range_, pose,
+                                                 machine_readings(machine, pose), LegVector::Zero());
+    ReducedPose reduced = reduce_to_observed(legs, {true, true, true, true, true, true}, free_.selection);
+    reduced.jacobian *= scales_.asDiagonal();
     return {reduced.jacobian, legs.by_pose};
   }
 
   const PlatformGeometry& nominal_;
   const PlanOptions& options_;
-  IdentifyResult identified_;
+  FreeParameters free_;
+  Eigen::VectorXd scales_;
+  Eigen::Matrix<double, 6, 2> stroke_range_;
 };
 
 Eigen::MatrixXd covariance_of(const std::vector<Whitened>& design, const std::vector<std::size_t>& chosen,

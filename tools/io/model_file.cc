@@ -53,7 +53,7 @@ void read_extensions(const YamlMap& map, MachineModel& machine) {
       curve.high = curves[leg].number("high");
       curve.coefficients_mm = curves[leg].numbers("coefficients_mm");
       curves[leg].finish();
-      if (!(curve.high > curve.low)) map.fail("stroke_curves", "found low not below high");
+      if (curve.high == curve.low) map.fail("stroke_curves", "found low equal to high");
     }
   }
   if (map.has("sag")) machine.sag = Eigen::Map<const Eigen::Vector4d>(map.numbers("sag", 4).data());
