@@ -67,7 +67,8 @@ struct FrameRule {
 enum class ScaleFrom { markers, bars, nominal };
 
 /// A camera of the campaign and the photographs it is for: those of a body with this serial number, those in
-/// a folder of this name, or (both empty) all.
+/// a folder of this name, or (both empty) all. Where several are for one photograph (one per zoom setting),
+/// the first whose image size and lens setting fit.
 struct CampaignCamera {
   std::filesystem::path file;
   std::string serial;

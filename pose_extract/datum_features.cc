@@ -20,7 +20,7 @@ constexpr double kSteepestDeg = 10;     // least angle between z and x
 struct FeaturePoints {
   Feature::Kind kind;
   std::vector<MarkerPoint> names;
-  Eigen::Matrix3Xd points, normals;
+  Eigen::Matrix3Xd points, normals, centres;
   Eigen::VectorXd sigma_mm;
   std::vector<Eigen::Matrix3Xd> by_common;
   std::vector<char> used;
@@ -33,8 +33,9 @@ FeaturePoints gather(const Network& network, const AdjustmentResult& adjusted, B
   out.kind = feature.kind;
   std::vector<Eigen::Vector3d> points;
   std::vector<Eigen::Vector3d> normals;
+  std::vector<Eigen::Vector3d> centres;
   std::vector<double> sigmas;
-  const auto add = [&](int marker, const MarkerPoint& name) {
+  const auto add = [&](int marker, const MarkerPoint& name, bool single) {
     Eigen::Matrix3Xd by_common;
     points.push_back(
         marker_point(network, adjusted.geometry, adjusted.layout, marker, name.corner, &by_common));
@@ -42,6 +43,9 @@ FeaturePoints gather(const Network& network, const AdjustmentResult& adjusted, B
     sigmas.push_back(std::sqrt(std::max(1e-10, covariance.trace() / 3)));
     normals.emplace_back(
         adjusted.geometry.body_from_marker[static_cast<std::size_t>(marker)].rotation_matrix().col(2));
+    centres.push_back(name.corner >= 0 && single
+                          ? points.back()
+                          : marker_point(network, adjusted.geometry, adjusted.layout, marker, -1, nullptr));
     out.names.push_back(name);
     out.by_common.push_back(std::move(by_common));
   };
@@ -52,17 +56,19 @@ FeaturePoints gather(const Network& network, const AdjustmentResult& adjusted, B
     const bool single =
         name.corner >= 0 || feature.kind == Feature::Kind::point || feature.kind == Feature::Kind::line;
     if (single) {
-      add(marker, name);
+      add(marker, name, true);
     } else {
-      for (int c = 0; c < 4; ++c) add(marker, {name.id, c});
+      for (int c = 0; c < 4; ++c) add(marker, {name.id, c}, false);
     }
   }
   out.points.resize(3, static_cast<Eigen::Index>(points.size()));
   out.normals.resize(3, static_cast<Eigen::Index>(points.size()));
+  out.centres.resize(3, static_cast<Eigen::Index>(points.size()));
   out.sigma_mm.resize(static_cast<Eigen::Index>(points.size()));
   for (std::size_t i = 0; i < points.size(); ++i) {
     out.points.col(static_cast<Eigen::Index>(i)) = points[i];
     out.normals.col(static_cast<Eigen::Index>(i)) = normals[i];
+    out.centres.col(static_cast<Eigen::Index>(i)) = centres[i];
     out.sigma_mm[static_cast<Eigen::Index>(i)] = sigmas[i];
   }
   // Weights inside one feature follow the stickers, not the noise: the gauge's marker would otherwise count
@@ -80,7 +86,7 @@ FeaturePoints gather(const Network& network, const AdjustmentResult& adjusted, B
 
 FittedFeature fit(const FeaturePoints& points) {
   FittedFeature fitted =
-      fit_feature(points.kind, points.points, points.sigma_mm, points.normals, points.used);
+      fit_feature(points.kind, points.points, points.sigma_mm, points.normals, points.centres, points.used);
   if (!fitted.ok) return fitted;
   Eigen::Vector3d side = Eigen::Vector3d::Zero();
   if (points.towards) {
@@ -90,6 +96,20 @@ FittedFeature fit(const FeaturePoints& points) {
   }
   if (side.dot(fitted.direction) < 0) fitted.direction = -fitted.direction;
   return fitted;
+}
+
+// Distance of each marker from the feature. On a cylinder the corners of a flat sticker lie on either side of
+// it by as much as it is glued off the middle of its face: only their mean tells whether it is lifted.
+std::map<int, double> marker_distances(const FeaturePoints& points, const FittedFeature& fitted) {
+  std::map<int, std::pair<double, int>> sums;
+  for (std::size_t i = 0; i < points.names.size(); ++i) {
+    auto& [sum, count] = sums[points.names[i].id];
+    sum += fitted.distance_mm[i];
+    ++count;
+  }
+  std::map<int, double> means;
+  for (const auto& [id, sum] : sums) means[id] = sum.first / sum.second;
+  return means;
 }
 
 // Whole markers that do not lie on the feature: first the consensus, then the residuals of the fit.
@@ -113,9 +133,11 @@ void choose_points(FeaturePoints& points) {
     if (!fitted.ok) return;
     double worst = tolerance;
     int id = -1;
+    const std::map<int, double> distances = marker_distances(points, fitted);
     for (std::size_t i = 0; i < points.names.size(); ++i) {
-      if (!points.used[i] || std::abs(fitted.distance_mm[i]) <= worst) continue;
-      worst = std::abs(fitted.distance_mm[i]);
+      const double distance = std::abs(distances.at(points.names[i].id));
+      if (!points.used[i] || distance <= worst) continue;
+      worst = distance;
       id = points.names[i].id;
     }
     if (id < 0) return;
@@ -180,10 +202,23 @@ const char* form_name(Feature::Kind kind) {
 void report(const FeaturePoints& points, const char* name, DatumFrame& frame) {
   const FittedFeature fitted = fit(points);
   if (!fitted.ok || points.kind == Feature::Kind::point) return;
-  frame.notes.push_back(fmt::format("{}: {} {:.4f} mm", name, form_name(points.kind), fitted.form_error_mm));
+  const bool by_marker = points.kind == Feature::Kind::cylinder;
+  const std::map<int, double> means = marker_distances(points, fitted);
+  double form_error_mm = fitted.form_error_mm;
+  if (by_marker) {
+    double least = 0;
+    double most = 0;
+    for (std::size_t i = 0; i < points.names.size(); ++i) {
+      if (!points.used[i]) continue;
+      least = std::min(least, means.at(points.names[i].id));
+      most = std::max(most, means.at(points.names[i].id));
+    }
+    form_error_mm = most - least;
+  }
+  frame.notes.push_back(fmt::format("{}: {} {:.4f} mm", name, form_name(points.kind), form_error_mm));
   std::map<int, double> lifted;
   for (std::size_t i = 0; i < points.names.size(); ++i) {
-    const double distance = fitted.distance_mm[i];
+    const double distance = by_marker ? means.at(points.names[i].id) : fitted.distance_mm[i];
     frame.residuals.push_back({points.names[i], distance * fitted.direction,
                                points.sigma_mm[static_cast<Eigen::Index>(i)], points.used[i] != 0});
     if (!points.used[i] && std::abs(distance) > std::abs(lifted[points.names[i].id])) {

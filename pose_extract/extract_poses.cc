@@ -88,15 +88,27 @@ DatumFrame body_frame(const CampaignResult& result, const std::optional<FrameRul
   return frame_from_nominal(result.network, result.adjusted, body, rule->nominal, with_scale);
 }
 
+double scale_sigma(const CampaignResult& result, const DatumFrame& frame) {
+  const Eigen::RowVectorXd row = frame.by_common.row(6);
+  return std::sqrt((row * result.adjusted.common_covariance * row.transpose())(0) + frame.own(6, 6));
+}
+
+// Stated sizes of the markers beside the source of the scale; empty if they agree.
+std::string print_scale_words(double larger, double sigma, const char* source) {
+  if (std::abs(larger) <= kScaleDisagreementSigmas * sigma) return "";
+  return fmt::format(
+      "the markers are printed {:.4f} % larger than their stated sizes (sigma {:.4f} %): the scale is that "
+      "of the {}",
+      larger * 100, sigma * 100, source);
+}
+
 // Nominal coordinates beside another source of scale: do they agree?
 void compare_nominal_scale(const CampaignResult& base, const std::optional<FrameRule>& rule, Body body,
                            const char* name, std::vector<std::string>& warnings) {
   if (!rule || rule->from != FrameRule::From::nominal) return;
   const DatumFrame scaled = frame_from_nominal(base.network, base.adjusted, body, rule->nominal, true);
   if (!scaled.ok) return;
-  const Eigen::RowVectorXd row = scaled.by_common.row(6);
-  const double sigma =
-      std::sqrt((row * base.adjusted.common_covariance * row.transpose())(0) + scaled.own(6, 6));
+  const double sigma = scale_sigma(base, scaled);
   if (std::abs(scaled.scale - 1) <= kScaleDisagreementSigmas * sigma) return;
   warnings.push_back(
       fmt::format("{}'s nominal coordinates are {:.4f} % larger than measured (sigma {:.4f} %): they "
@@ -328,6 +340,16 @@ CampaignResult extract_poses(const Campaign& campaign, const CampaignObservation
       result.UG.scale = result.LG.scale;
     }
   }
+  std::string sizes;
+  const DatumFrame& scaled = by_ug ? result.UG : result.LG;
+  if (nominal_scale && scaled.ok) {
+    sizes = print_scale_words(scaled.scale - 1, scale_sigma(result, scaled), "nominal coordinates");
+  } else if (campaign.scale == ScaleFrom::bars && result.adjusted.layout.print_scale >= 0) {
+    const Eigen::Index i = result.adjusted.layout.print_scale;
+    sizes = print_scale_words(result.adjusted.geometry.print_scale,
+                              std::sqrt(result.adjusted.common_covariance(i, i)), "bars");
+  }
+  if (!sizes.empty()) result.warnings.push_back(sizes);
   if (!nominal_scale) {
     compare_nominal_scale(result, campaign.ug, Body::fixed, "UG", result.warnings);
     compare_nominal_scale(result, campaign.lg, Body::moving, "LG", result.warnings);

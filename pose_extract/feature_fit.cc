@@ -43,7 +43,8 @@ std::size_t fewest_points(Feature::Kind kind) {
 }
 
 // Distances of a point from the feature: one or two numbers.
-int distances(Feature::Kind kind, const Shape& shape, const Eigen::Vector3d& point, double out[2]) {
+int distances(Feature::Kind kind, const Shape& shape, const Eigen::Vector3d& point,
+              const Eigen::Vector3d& centre, double out[2]) {
   const Eigen::Vector3d d = point - shape.place;
   const double along = d.dot(shape.direction);
   const double across = (d - along * shape.direction).norm();
@@ -62,9 +63,12 @@ int distances(Feature::Kind kind, const Shape& shape, const Eigen::Vector3d& poi
       out[0] = along;
       out[1] = across - shape.radius;
       return 2;
-    case Feature::Kind::cylinder:
-      out[0] = across - shape.radius;
+    case Feature::Kind::cylinder: {
+      const Eigen::Vector3d to_centre = centre - shape.place;
+      const Eigen::Vector3d radial = to_centre - to_centre.dot(shape.direction) * shape.direction;
+      out[0] = d.dot(radial.normalized()) - shape.radius;
       return 1;
+    }
     case Feature::Kind::sphere:
       out[0] = d.norm() - shape.radius;
       return 1;
@@ -112,7 +116,8 @@ Shape start(Feature::Kind kind, const Eigen::Matrix3Xd& points, const Eigen::Mat
 }  // namespace
 
 FittedFeature fit_feature(Feature::Kind kind, const Eigen::Matrix3Xd& points, const Eigen::VectorXd& sigma_mm,
-                          const Eigen::Matrix3Xd& normals, const std::vector<char>& used) {
+                          const Eigen::Matrix3Xd& normals, const Eigen::Matrix3Xd& centres,
+                          const std::vector<char>& used) {
   FittedFeature fitted;
   fitted.used = used;
   std::vector<Eigen::Index> kept;
@@ -147,7 +152,7 @@ FittedFeature fit_feature(Feature::Kind kind, const Eigen::Matrix3Xd& points, co
     Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
     for (const Eigen::Index i : kept) {
       double r[2] = {0, 0};
-      const int rows = distances(kind, shape, points.col(i), r);
+      const int rows = distances(kind, shape, points.col(i), centres.col(i), r);
       for (int k = 0; k < rows; ++k) {
         // Central differences: the distances are smooth and cheap, the step far above rounding.
         Eigen::Matrix<double, 6, 1> j = Eigen::Matrix<double, 6, 1>::Zero();
@@ -155,8 +160,10 @@ FittedFeature fit_feature(Feature::Kind kind, const Eigen::Matrix3Xd& points, co
           const double h = c == 3 || c == 4 ? 1e-6 : 1e-4;
           double plus[2];
           double minus[2];
-          (void)distances(kind, moved(shape, h * Eigen::VectorXd::Unit(6, c), kind), points.col(i), plus);
-          (void)distances(kind, moved(shape, -h * Eigen::VectorXd::Unit(6, c), kind), points.col(i), minus);
+          (void)distances(kind, moved(shape, h * Eigen::VectorXd::Unit(6, c), kind), points.col(i),
+                          centres.col(i), plus);
+          (void)distances(kind, moved(shape, -h * Eigen::VectorXd::Unit(6, c), kind), points.col(i),
+                          centres.col(i), minus);
           j[c] = (plus[k] - minus[k]) / (2 * h);
         }
         const double weight = 1 / (sigma_mm[i] * sigma_mm[i]);
@@ -189,7 +196,7 @@ FittedFeature fit_feature(Feature::Kind kind, const Eigen::Matrix3Xd& points, co
   double most = 0;
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
     double r[2] = {0, 0};
-    const int rows = distances(kind, shape, points.col(i), r);
+    const int rows = distances(kind, shape, points.col(i), centres.col(i), r);
     const bool by_radius = kind == Feature::Kind::circle && std::abs(r[1]) > std::abs(r[0]);
     const double distance = kind == Feature::Kind::line ? std::hypot(r[0], r[1])
                             : rows == 2 && by_radius    ? r[1]

@@ -28,9 +28,12 @@ struct FittedFeature {
                                                  double tolerance_mm);
 
 /// Weighted least squares on the points of the consensus, weights 1 / sigma_mm^2; `normals` (3 x n) are the
-/// faces' outward normals where the points lie, which start a cylinder's axis.
+/// faces' outward normals where the points lie, which start a cylinder's axis. `centres` (3 x n) are the
+/// centres of the markers that the points belong to, or the points themselves: a cylinder's distances are
+/// taken along the radius through the centre, so that a flat sticker on the side of a prism counts with its
+/// plane and needs not be glued in the middle of it.
 [[nodiscard]] FittedFeature fit_feature(Feature::Kind kind, const Eigen::Matrix3Xd& points,
                                         const Eigen::VectorXd& sigma_mm, const Eigen::Matrix3Xd& normals,
-                                        const std::vector<char>& used);
+                                        const Eigen::Matrix3Xd& centres, const std::vector<char>& used);
 
 }  // namespace hexcal

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <map>
 #include <set>
+#include <tuple>
 
 #include "kinematics/geometry/input_error.h"
 
@@ -21,13 +22,40 @@ std::string lower(std::string text) {
 
 std::string extension(const fs::path& path) { return lower(path.extension().string()); }
 
-bool is_raw(const fs::path& path) { return extension(path) == ".nef" || extension(path) == ".dng"; }
+// Of files with one stem the format that stands first is taken: what the camera itself developed, then what
+// people developed, then RAW.
+int format_rank(const fs::path& path) {
+  static const std::map<std::string, int> kRanks{{".jpg", 0}, {".jpeg", 0}, {".tif", 1}, {".tiff", 1},
+                                                 {".png", 2}, {".nef", 3},  {".dng", 4}};
+  const auto found = kRanks.find(extension(path));
+  return found == kRanks.end() ? -1 : found->second;
+}
 
 bool is_litter(const fs::path& path) {
-  static const std::set<std::string> kNames{"thumbs.db", "desktop.ini", "__macosx", "thumbnails",
-                                            "thumbs",    "results",     "@eadir",   "lost+found"};
+  static const std::set<std::string> kNames{"thumbs.db",
+                                            "desktop.ini",
+                                            "__macosx",
+                                            "thumbnails",
+                                            "thumbs",
+                                            "results",
+                                            "@eadir",
+                                            "lost+found",
+                                            "#recycle",
+                                            "$recycle.bin",
+                                            "system volume information"};
   const std::string name = path.filename().string();
   return name.empty() || name.front() == '.' || kNames.count(lower(name)) != 0;
+}
+
+// Folders that tell formats apart, as cameras and RAW developers make them: no poses.
+bool is_format_folder(const fs::path& path) {
+  static const std::set<std::string> kNames{"raw",   "nef", "dng",  "jpg", "jpeg",
+                                            "jpegs", "tif", "tiff", "png"};
+  return kNames.count(lower(path.filename().string())) != 0;
+}
+
+bool is_thumbnail(const fs::path& path) {
+  return lower(path.stem().string()).find("thumb") != std::string::npos;
 }
 
 bool name_less(const fs::path& a, const fs::path& b) { return natural_less(a.string(), b.string()); }
@@ -59,24 +87,22 @@ class Lister {
   Lister(const fs::path& root, const ListingOptions& options) : root_(root), options_(options) {}
 
   ImageListing list() {
-    const Folder top = read_folder(root_);
-    if (!options_.table.empty()) {
-      list_table();
-    } else if (top.folders.empty()) {
-      add_pose(root_, top.files, "");
+    if (options_.table.empty()) {
+      walk(root_, {}, "");
+      set_strays_aside();
     } else {
-      for (const fs::path& file : top.files)
-        skip(file, "stray: it lies beside the pose folders, in none of them");
-      for (const fs::path& folder : top.folders) walk(folder);
+      list_table();
     }
+    for (auto& [key, files] : poses_) take_one_format(files);
     return finish();
   }
 
  private:
-  struct Pending {
-    fs::path folder;  // gives the pose its id
+  struct Found {
     fs::path file;
     std::string camera;
+    fs::path place;  // its folder, without the parts that only tell cameras or formats apart
+    [[nodiscard]] auto exposure() const { return std::tuple(place, camera, lower(file.stem().string())); }
   };
 
   [[nodiscard]] std::string name(const fs::path& path) const {
@@ -92,66 +118,103 @@ class Lister {
            options_.camera_folders.end();
   }
 
-  void walk(const fs::path& path) {
+  // `key` is the pose: the folder's path without the parts that only tell cameras or formats apart.
+  void walk(const fs::path& path, const fs::path& key, const std::string& camera) {
+    std::error_code error;
+    const fs::path real = fs::canonical(path, error);
+    if (error || !visited_.insert(real).second) return;  // links may lead in a circle
     const Folder folder = read_folder(path);
-    const bool has_cameras = std::any_of(folder.folders.begin(), folder.folders.end(),
-                                         [&](const fs::path& sub) { return is_camera_folder(sub); });
-    if (!folder.files.empty() || has_cameras || folder.folders.empty()) add_pose(path, folder.files, "");
+    for (const fs::path& file : folder.files) {
+      if (is_thumbnail(file)) {
+        skip(file, "a thumbnail by its name");
+      } else {
+        poses_[options_.one_heap ? fs::path() : key].push_back({file, camera, key});
+      }
+    }
+    if (folder.folders.empty() && folder.files.empty() && !key.empty() && !options_.one_heap) {
+      poses_[key];  // a pose whose photographs are missing
+    }
     for (const fs::path& sub : folder.folders) {
       if (is_camera_folder(sub)) {
-        add_pose(path, read_folder(sub).files, sub.filename().string());
+        walk(sub, key, sub.filename().string());
       } else {
-        walk(sub);
+        walk(sub, is_format_folder(sub) ? key : key / sub.filename(), camera);
       }
     }
   }
 
-  void add_pose(const fs::path& path, const std::vector<fs::path>& files, const std::string& camera) {
-    folders_.insert(path);
-    std::map<std::string, std::string> chosen;  // stem -> the name that is taken
-    for (const fs::path& file : files) {
-      if (!is_raw(file)) chosen.emplace(lower(file.stem().string()), file.filename().string());
+  // A photograph beside pose folders: at the top always, further down when it lies there alone.
+  void set_strays_aside() {
+    for (auto pose = poses_.begin(); pose != poses_.end();) {
+      const fs::path& key = pose->first;
+      const bool has_poses_below = std::any_of(poses_.begin(), poses_.end(), [&key](const auto& other) {
+        return other.first != key &&
+               (key.empty() ||
+                std::mismatch(key.begin(), key.end(), other.first.begin(), other.first.end()).first ==
+                    key.end());
+      });
+      if (!has_poses_below || (!key.empty() && pose->second.size() != 1)) {
+        ++pose;
+        continue;
+      }
+      for (const Found& found : pose->second)
+        skip(found.file, "stray: it lies beside the pose folders, in none of them");
+      pose = poses_.erase(pose);
     }
-    for (const fs::path& file : files) {
-      const auto beside = chosen.find(lower(file.stem().string()));
-      if (is_raw(file) && beside != chosen.end()) {
-        skip(file, fmt::format("RAW of {}, which is taken", beside->second));
+  }
+
+  // One exposure counts once, however many formats it was saved in.
+  void take_one_format(std::vector<Found>& files) {
+    std::map<std::tuple<fs::path, std::string, std::string>, const Found*> best;
+    for (const Found& found : files) {
+      const Found*& chosen = best[found.exposure()];
+      if (chosen == nullptr || format_rank(found.file) < format_rank(chosen->file)) chosen = &found;
+    }
+    std::vector<Found> taken;
+    for (const Found& found : files) {
+      const Found& chosen = *best.at(found.exposure());
+      if (format_rank(found.file) == format_rank(chosen.file)) {
+        taken.push_back(found);
       } else {
-        pending_.push_back({path, file, camera});
+        skip(found.file, fmt::format("{} of {}, which is taken", format_rank(found.file) > 2 ? "RAW" : "copy",
+                                     name(chosen.file)));
       }
     }
+    files = std::move(taken);
   }
 
   void list_table() {
-    std::set<std::string> poses;
+    std::map<std::string, fs::path> by_lower_name;
+    const std::vector<fs::path> present = read_folder(root_).files;
+    for (const fs::path& file : present) by_lower_name.emplace(lower(file.filename().string()), file);
     std::set<fs::path> listed;
     for (const auto& [file, pose] : options_.table) {
-      const fs::path path = root_ / file;
-      if (!fs::exists(path)) {
-        throw InputError(fmt::format("{}: no such photograph, named in the table of images for pose {}",
-                                     path.string(), pose));
+      fs::path path = root_ / file;
+      const auto other_case = by_lower_name.find(lower(file));
+      if (!fs::exists(path) && other_case != by_lower_name.end()) path = other_case->second;
+      if (!listed.insert(path).second) {
+        skip(path, fmt::format("named twice in the table of images; not taken for pose {}", pose));
+        continue;
       }
-      poses.insert(pose);
-      listed.insert(path);
-      listing_.images.push_back({path, name(path), pose, ""});
+      poses_[pose].push_back(
+          {path, "", path.parent_path()});  // a missing file becomes its photograph's status
     }
-    listing_.poses.assign(poses.begin(), poses.end());
-    for (const fs::path& file : read_folder(root_).files) {
+    for (const fs::path& file : present) {
       if (listed.count(file) == 0) skip(file, "stray: not named in the table of images");
     }
   }
 
   ImageListing finish() {
     std::map<std::string, int> times;
-    for (const fs::path& folder : folders_) ++times[folder.filename().string()];
-    std::map<fs::path, std::string> ids;
-    for (const fs::path& folder : folders_) {
-      const std::string last = folder.filename().string();
-      ids[folder] = times[last] > 1 ? name(folder) : last;
-      listing_.poses.push_back(ids[folder]);
-    }
-    for (const Pending& image : pending_) {
-      listing_.images.push_back({image.file, name(image.file), ids[image.folder], image.camera});
+    for (const auto& [key, files] : poses_) ++times[key.filename().string()];
+    for (const auto& [key, files] : poses_) {
+      const fs::path named = key.empty() ? fs::absolute(root_).lexically_normal() : key;
+      const std::string last = named.filename().string();
+      const bool alone = times[last] <= 1 && options_.table.empty();
+      const std::string id = alone ? last : named.generic_string();
+      listing_.poses.push_back(id);
+      for (const Found& found : files)
+        listing_.images.push_back({found.file, name(found.file), id, found.camera});
     }
     std::sort(listing_.poses.begin(), listing_.poses.end(), natural_less);
     std::stable_sort(listing_.images.begin(), listing_.images.end(),
@@ -164,16 +227,13 @@ class Lister {
   fs::path root_;
   const ListingOptions& options_;
   ImageListing listing_;
-  std::set<fs::path> folders_;
-  std::vector<Pending> pending_;
+  std::map<fs::path, std::vector<Found>> poses_;
+  std::set<fs::path> visited_;
 };
 
 }  // namespace
 
-bool is_photograph_name(const fs::path& path) {
-  static const std::set<std::string> kExtensions{".jpg", ".jpeg", ".png", ".tif", ".tiff", ".nef", ".dng"};
-  return kExtensions.count(extension(path)) != 0;
-}
+bool is_photograph_name(const fs::path& path) { return format_rank(path) >= 0; }
 
 bool natural_less(const std::string& a, const std::string& b) {
   std::size_t i = 0;
@@ -207,7 +267,9 @@ ImageListing list_images(const fs::path& folder, const ListingOptions& options) 
     throw InputError(fmt::format("{}: no such folder, wanted one with a sub-folder of photographs per pose",
                                  folder.string()));
   }
-  return Lister(folder.lexically_normal(), options).list();
+  fs::path root = folder.lexically_normal();
+  if (root.filename().empty()) root = root.parent_path();  // a slash at the end
+  return Lister(root, options).list();
 }
 
 }  // namespace hexcal

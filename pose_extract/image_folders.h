@@ -12,7 +12,7 @@ struct CampaignImage {
   std::filesystem::path path;
   std::string name;    ///< relative to the image folder, with '/'
   std::string pose;    ///< pose id
-  std::string folder;  ///< name of the camera sub-folder it lies in; empty if none
+  std::string folder;  ///< name of the camera folder it lies in; empty if none
 };
 
 /// A file that is not measured, and why.
@@ -28,21 +28,23 @@ struct ImageListing {
 };
 
 struct ListingOptions {
-  /// Sub-folders of these names tell cameras apart and are not poses.
+  /// Folders of these names, above or below the poses', tell cameras apart and are not poses.
   std::vector<std::string> camera_folders;
   /// (file, pose) for photographs in one flat folder; empty: folders are poses.
   std::vector<std::pair<std::string, std::string>> table;
+  bool one_heap = false;  ///< folders mean nothing (a memory card): all photographs are one pose
 };
 
 /// True for names such as DSC_0001.JPG, img.tiff, x.nef, in any case.
 [[nodiscard]] bool is_photograph_name(const std::filesystem::path& path);
 
-/// Lists the photographs below `folder`. A pose is a folder that directly holds photographs, whatever lies
-/// above it; its id is the folder's name, or its path where two have the same name. A folder without
-/// sub-folders is one pose. Hidden files, thumbnails' folders and the litter of operating systems are passed
-/// over in silence; of a RAW file and a JPEG with the same name the JPEG is taken; a photograph that lies
-/// beside pose folders is named as stray. Throws InputError if the folder does not exist or a file of the
-/// table does not.
+/// Lists the photographs below `folder`. A pose is a folder that holds photographs, whatever lies above it,
+/// with those of its sub-folders that only tell cameras (options) or formats (raw, jpg, ...) apart; its id is
+/// the folder's name, or its path where two have the same name. A folder without sub-folders is one pose.
+/// Hidden files, thumbnails' folders and the litter of operating systems are passed over in silence. Of an
+/// exposure in several formats one is taken: JPEG, then TIFF, PNG, RAW. Photographs that lie beside pose
+/// folders are named as stray. A file of the table that does not exist is listed, for its status to say so.
+/// Throws InputError if the folder does not exist.
 [[nodiscard]] ImageListing list_images(const std::filesystem::path& folder, const ListingOptions& options);
 
 /// Natural order: runs of digits compare as numbers.

@@ -16,6 +16,20 @@ namespace {
 constexpr double kAmbiguousSigmas2 =
     30;  // rise of the sum of squares below which the flipped pose stays possible
 constexpr double kScaleDisagreementSigmas = 3;
+// Residuals over what the photographs promise, beyond which something is wrong with the whole: real lenses
+// and prints stay below 2.
+constexpr double kSuspectSigma0 = 3;
+
+// A pair counts as swapped when it fits so many times better that way: machines are wrong by centimetres, but
+// neighbouring poses not in opposite directions.
+constexpr double kSwappedFitsBetter = 3;
+constexpr double kLeverMm = 100;  // what a radian of rotation counts for
+
+double pose_gap_mm(const Pose& a, const Pose& b) {
+  const Rigid3 between = inverse(home_from_lg(a)) * home_from_lg(b);
+  return (a.position_mm - b.position_mm).norm() +
+         kLeverMm * rotation_vector_from_quaternion(between.rotation).norm();
+}
 
 void add_words(std::string& words, const std::string& more) {
   if (!words.empty()) words += "; ";
@@ -305,6 +319,16 @@ void judge_campaign(const Campaign& campaign, CampaignResult& result) {
     result.warnings.push_back(
         fmt::format("seen in one photograph only and not used: marker {}", fmt::join(once, ", ")));
   }
+  if (adjusted.sigma0 > kSuspectSigma0) {
+    result.warnings.push_back(fmt::format(
+        "residuals are {:.1f} times what the photographs promise: the camera file is not of this lens "
+        "setting, or "
+        "the markers are not flat and square; sigmas are enlarged by that and may still be too small",
+        adjusted.sigma0));
+    for (MeasuredPose& pose : result.poses) {
+      if (pose.pose) add_words(pose.words, "the campaign's residuals are too large: see the warnings");
+    }
+  }
   if (adjusted.interior_loosened) {
     result.warnings.push_back(
         fmt::format("the camera is not as it was calibrated: its interior orientation moved by {:.1f} sigma "
@@ -312,7 +336,8 @@ void judge_campaign(const Campaign& campaign, CampaignResult& result) {
                     std::sqrt(adjusted.interior_chi2 / std::max(1, adjusted.interior_dof))));
   }
   for (const MeasuredLength& bar : result.bars) {
-    if (!bar.measured || campaign.scale == ScaleFrom::bars) continue;
+    // A single bar that gives the scale agrees with itself.
+    if (!bar.measured || (campaign.scale == ScaleFrom::bars && result.bars.size() < 2)) continue;
     const double off = bar.length_mm - bar.known.length_mm;
     const double sigma = std::hypot(bar.sigma_mm, bar.known.sigma_mm);
     if (std::abs(off) > kScaleDisagreementSigmas * sigma) {
@@ -325,6 +350,24 @@ void judge_campaign(const Campaign& campaign, CampaignResult& result) {
   for (const DatumFrame* frame : {&result.UG, &result.LG}) {
     for (const std::string& note : frame->notes) {
       result.warnings.push_back(fmt::format("{}: {}", frame == &result.UG ? "UG" : "LG", note));
+    }
+  }
+}
+
+void judge_swapped_folders(const std::vector<std::optional<Pose>>& targets, CampaignResult& result) {
+  std::vector<MeasuredPose>& poses = result.poses;
+  const auto known = [&](std::size_t i) { return poses[i].pose && targets[i]; };
+  const auto gap = [&](std::size_t measured, std::size_t target) {
+    return pose_gap_mm(*poses[measured].pose, *targets[target]);
+  };
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    for (std::size_t j = i + 1; j < poses.size(); ++j) {
+      if (!known(i) || !known(j)) continue;
+      if (kSwappedFitsBetter * (gap(i, j) + gap(j, i)) >= gap(i, i) + gap(j, j)) continue;
+      result.warnings.push_back(fmt::format(
+          "{} and {} look swapped: each lies where the other was commanded to", poses[i].id, poses[j].id));
+      add_words(poses[i].words, fmt::format("swapped with {}?", poses[j].id));
+      add_words(poses[j].words, fmt::format("swapped with {}?", poses[i].id));
     }
   }
 }

@@ -14,4 +14,8 @@ void judge_poses(const Campaign& campaign, const CampaignObservations& observati
 /// Warnings about the campaign: moved markers, bars that disagree, a camera that is not as calibrated.
 void judge_campaign(const Campaign& campaign, CampaignResult& result);
 
+/// Names the poses that lie where another was to be and it where they were, as after two folders' names were
+/// swapped. `targets` are the commanded poses in the order of result.poses; none where unknown.
+void judge_swapped_folders(const std::vector<std::optional<Pose>>& targets, CampaignResult& result);
+
 }  // namespace hexcal

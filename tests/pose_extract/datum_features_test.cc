@@ -1,4 +1,7 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
+
+#include <algorithm>
 
 #include "pose_extract/datum_frame.h"
 #include "pose_extract/feature_fit.h"
@@ -7,12 +10,22 @@
 namespace hexcal {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
 // A twelve-sided grip: markers on its sides (ids 0-11) and on its end plate (ids 12-17), the frame's z its
 // axis.
-ObservationScene twelve_sided_grip(double noise_px, double lifted_mm) {
+// `lifted` is the marker that stands off by 0.1 mm; `glued_mm` and `glued_deg` are how far stickers were
+// glued from where they belong, inside their faces.
+struct GripOptions {
+  double noise_px = 0;
+  int lifted = -1;
+  double glued_mm = 0;
+  double glued_deg = 0;
+};
+
+ObservationScene twelve_sided_grip(const GripOptions& options) {
   ObservationScene scene;
   scene.true_camera = CameraModel(6016, 4000, 9011.0);
   scene.network.cameras.push_back({scene.true_camera, {}});
@@ -27,13 +40,20 @@ ObservationScene twelve_sided_grip(double noise_px, double lifted_mm) {
   }
   for (int i = 0; i < 6; ++i) {
     const double azimuth = 60.0 * i * kRadPerDeg;
-    const double lift = i == 3 ? lifted_mm : 0;
     scene.body_from_marker.push_back(
-        Rigid3::from_translation({35 * std::cos(azimuth), 35 * std::sin(azimuth), lift}));
+        Rigid3::from_translation({35 * std::cos(azimuth), 35 * std::sin(azimuth), 0}));
     scene.network.markers.push_back({12 + i, Body::fixed, 20});
   }
   std::mt19937_64 rng(5);
-  std::normal_distribution<double> normal(0.0, noise_px);
+  std::normal_distribution<double> unit(0.0, 1.0);
+  const auto normal = [&](std::mt19937_64& random) { return options.noise_px * unit(random); };
+  for (std::size_t m = 0; m < scene.network.markers.size(); ++m) {
+    const Eigen::Vector3d shift(options.glued_mm * unit(rng), options.glued_mm * unit(rng),
+                                scene.network.markers[m].id == options.lifted ? 0.1 : 0);
+    const Eigen::Vector3d turn(0, 0, options.glued_deg * kRadPerDeg * unit(rng));
+    scene.body_from_marker[m] =
+        scene.body_from_marker[m] * Rigid3(quaternion_from_rotation_vector(turn), shift);
+  }
   for (int p = 0; p < 12; ++p) {
     const double azimuth = 30.0 * p * kRadPerDeg;
     const Eigen::Vector3d eye(600 * std::cos(azimuth), 600 * std::sin(azimuth), 350);
@@ -74,15 +94,16 @@ Feature feature(Feature::Kind kind, int first, int last) {
   return out;
 }
 
-TEST(DatumFeatures, AxisAndEndPlateOfAGripAreFoundAndALiftedStickerIsNamed) {
-  const ObservationScene scene = twelve_sided_grip(0.01, 0.1);
+// The grip's axis as z, its end plate as origin, both from markers.
+void expect_axis_and_end_plate(const GripOptions& options) {
+  const ObservationScene scene = twelve_sided_grip(options);
   const AdjustmentResult adjusted = adjust_network(scene.network, {});
   ASSERT_EQ(adjusted.status, AdjustmentStatus::ok) << adjusted.reason;
   FeatureFrame features;
   features.z = feature(Feature::Kind::cylinder, 0, 11);
   features.z.towards = MarkerPoint{12, -1};
   features.x.kind = Feature::Kind::line;
-  features.x.points = {{13, -1}, {12, -1}};
+  features.x.points = {{15, -1}, {12, -1}};
   features.origin = feature(Feature::Kind::plane, 12, 17);  // where the axis meets the end plate
   const DatumFrame frame = frame_from_features(scene.network, adjusted, Body::fixed, features);
   ASSERT_TRUE(frame.ok) << frame.reason;
@@ -92,15 +113,29 @@ TEST(DatumFeatures, AxisAndEndPlateOfAGripAreFoundAndALiftedStickerIsNamed) {
   EXPECT_LT(frame_from_true.translation.norm(), 0.010);
   const double tilt = std::acos(std::min(1.0, frame_from_true.rotation_matrix()(2, 2)));
   EXPECT_LT(tilt * kDegPerRad, 0.01);
-  EXPECT_THAT(frame.notes, Contains(HasSubstr("marker 15 lies 0.1")));
+  if (options.lifted >= 0) {
+    EXPECT_THAT(frame.notes, Contains(AllOf(HasSubstr(fmt::format("marker {} lies ", options.lifted)),
+                                            HasSubstr("lifted"))));
+  }
+  EXPECT_EQ(std::count_if(frame.notes.begin(), frame.notes.end(),
+                          [](const std::string& note) { return note.find("lifted") != std::string::npos; }),
+            options.lifted >= 0 ? 1 : 0);
   // The stated covariance explains the error of the origin.
   const Eigen::Matrix3d covariance =
       (frame.by_common * adjusted.common_covariance * frame.by_common.transpose()).topLeftCorner<3, 3>();
   EXPECT_GT(covariance.trace(), 0);
 }
 
+TEST(DatumFeatures, AxisAndEndPlateOfAGrip) { expect_axis_and_end_plate({0.01, -1, 0, 0}); }
+TEST(DatumFeatures, ALiftedStickerOnTheEndPlateIsNamed) { expect_axis_and_end_plate({0.01, 15, 0, 0}); }
+TEST(DatumFeatures, ALiftedStickerOnTheSideIsNamed) { expect_axis_and_end_plate({0.01, 4, 0, 0}); }
+TEST(DatumFeatures, StickersThatWereGluedByHandTellTheSameAxis) {
+  expect_axis_and_end_plate({0.01, -1, 0.5, 1.0});
+  expect_axis_and_end_plate({0.01, 7, 0.5, 1.0});
+}
+
 TEST(DatumFeatures, ParallelDirectionsAreRefused) {
-  const ObservationScene scene = twelve_sided_grip(0, 0);
+  const ObservationScene scene = twelve_sided_grip({});
   const AdjustmentResult adjusted = adjust_network(scene.network, {});
   FeatureFrame features;
   features.z = feature(Feature::Kind::plane, 12, 17);
@@ -136,8 +171,8 @@ TEST(FeatureFit, RecoversEachKindExactly) {
   for (const Feature::Kind kind : {Feature::Kind::plane, Feature::Kind::line, Feature::Kind::circle,
                                    Feature::Kind::cylinder, Feature::Kind::sphere}) {
     fill(kind);
-    const FittedFeature fitted =
-        fit_feature(kind, points, Eigen::VectorXd::Constant(24, 0.01), normals, std::vector<char>(24, 1));
+    const FittedFeature fitted = fit_feature(kind, points, Eigen::VectorXd::Constant(24, 0.01), normals,
+                                             points, std::vector<char>(24, 1));
     ASSERT_TRUE(fitted.ok) << static_cast<int>(kind) << fitted.reason;
     EXPECT_LT(fitted.form_error_mm, 1e-6) << static_cast<int>(kind);
     if (kind != Feature::Kind::sphere) {

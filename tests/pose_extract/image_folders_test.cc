@@ -94,7 +94,33 @@ TEST_F(ImageFolders, FlatFolderWithATable) {
   const ImageListing listing = list_images(root_, {{}, {{"b.jpg", "home"}, {"a.jpg", "p1"}}});
   EXPECT_THAT(names(listing), ElementsAre("home|b.jpg", "p1|a.jpg"));
   EXPECT_EQ(listing.skipped.at(0).name, "c.jpg");
-  EXPECT_THROW((void)list_images(root_, {{}, {{"missing.jpg", "home"}}}), InputError);
+}
+
+TEST_F(ImageFolders, AFileOfTheTableThatIsMissingIsListedForItsStatusToSaySo) {
+  touch("a.jpg");
+  const ImageListing listing = list_images(root_, {{}, {{"missing.jpg", "home"}, {"A.JPG", "p1"}}});
+  EXPECT_THAT(names(listing), ElementsAre("home|missing.jpg", "p1|a.jpg"));
+}
+
+TEST_F(ImageFolders, CameraFoldersMayStandAboveThePoses) {
+  for (const char* name : {"left/p1/a.jpg", "right/p1/a.jpg", "left/p2/a.jpg"}) touch(name);
+  const ImageListing listing = list_images(root_, {{"left", "right"}, {}});
+  EXPECT_THAT(names(listing), ElementsAre("p1|left/p1/a.jpg", "p1|right/p1/a.jpg", "p2|left/p2/a.jpg"));
+}
+
+TEST_F(ImageFolders, FormatFoldersBelongToTheirPoseAndOneFormatIsTaken) {
+  for (const char* name : {"p1/JPG/a.jpg", "p1/RAW/a.nef", "p1/RAW/b.nef", "p2/a.tif", "p2/a.png"})
+    touch(name);
+  const ImageListing listing = list_images(root_, {});
+  EXPECT_THAT(names(listing), ElementsAre("p1|p1/JPG/a.jpg", "p1|p1/RAW/b.nef", "p2|p2/a.tif"));
+  EXPECT_EQ(listing.skipped.size(), 2U);
+}
+
+TEST_F(ImageFolders, OneHeapIgnoresFoldersAndKeepsNumbersOfTheCardsFoldersApart) {
+  for (const char* name : {"100NCD/DSC_1.JPG", "101NCD/DSC_1.JPG", "101NCD/DSC_1.NEF"}) touch(name);
+  ListingOptions options;
+  options.one_heap = true;
+  EXPECT_EQ(list_images(root_, options).images.size(), 2U);
 }
 
 TEST_F(ImageFolders, MissingFolderIsTheUsersError) {

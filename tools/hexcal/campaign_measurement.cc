@@ -8,16 +8,20 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <set>
 
 #include "kinematics/geometry/input_error.h"
 #include "photogrammetry/photograph/sha256.h"
+#include "pose_extract/pose_verdict.h"
 #include "tools/hexcal/capture_groups.h"
 #include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/camera_file.h"
 #include "tools/io/campaign_file.h"
 #include "tools/io/observations_file.h"
+#include "tools/io/pose_table.h"
 
 namespace hexcal {
 namespace fs = std::filesystem;
@@ -25,24 +29,42 @@ namespace {
 
 constexpr int kCacheFormat = 1;  // counts up when detection changes what it finds
 
-// The camera a photograph is for: by folder, by the body's serial number, or the only one.
-int camera_of(const Campaign& campaign, const CampaignImage& image) {
-  const auto& cameras = campaign.cameras;
+// The camera a photograph is for: by folder, by the body's serial number, or one that is for all. Of several
+// (one per zoom setting) the first whose image size and lens setting fit.
+int camera_of(const OpenCampaign& open, const CampaignImage& image) {
+  const auto& cameras = open.campaign.cameras;
+  std::optional<PhotographInfo> info;
+  const auto exif = [&]() -> const PhotographInfo& {
+    if (!info) info = read_photograph_info(image.path);
+    return *info;
+  };
+  std::vector<int> by_folder;
+  std::vector<int> by_serial;
+  std::vector<int> for_all;
   for (std::size_t c = 0; c < cameras.size(); ++c) {
-    if (!cameras[c].folder.empty() && cameras[c].folder == image.folder) return static_cast<int>(c);
-  }
-  const bool by_serial =
-      std::any_of(cameras.begin(), cameras.end(), [](const CampaignCamera& c) { return !c.serial.empty(); });
-  if (by_serial) {
-    const std::string serial = read_photograph_info(image.path).serial.value_or("");
-    for (std::size_t c = 0; c < cameras.size(); ++c) {
-      if (!cameras[c].serial.empty() && cameras[c].serial == serial) return static_cast<int>(c);
+    const CampaignCamera& camera = cameras[c];
+    if (!camera.folder.empty()) {
+      if (camera.folder == image.folder) by_folder.push_back(static_cast<int>(c));
+    } else if (!camera.serial.empty()) {
+      if (camera.serial == exif().serial.value_or("")) by_serial.push_back(static_cast<int>(c));
+    } else {
+      for_all.push_back(static_cast<int>(c));
     }
   }
-  for (std::size_t c = 0; c < cameras.size(); ++c) {
-    if (cameras[c].serial.empty() && cameras[c].folder.empty()) return static_cast<int>(c);
+  const std::vector<int>& candidates = !by_folder.empty()   ? by_folder
+                                       : !by_serial.empty() ? by_serial
+                                                            : for_all;
+  if (candidates.empty()) return -1;
+  if (candidates.size() == 1) return candidates.front();
+  for (const int c : candidates) {
+    const CalibratedCamera& camera = open.cameras[static_cast<std::size_t>(c)];
+    const auto differences = compare_setting(camera.setting, exif());
+    if (std::none_of(differences.begin(), differences.end(),
+                     [](const SettingDifference& difference) { return difference.fatal; })) {
+      return c;
+    }
   }
-  return -1;
+  return candidates.front();
 }
 
 std::string ids_text(const std::vector<int>& ids) {
@@ -103,31 +125,55 @@ OpenCampaign open_campaign(const MeasureRequest& request) {
     for (const ImageRow& row : read_images_table(*campaign.images_table))
       options.table.emplace_back(row.file, row.pose);
   }
-  if (request.group_by_time_s) options.table = group_by_capture_time(images, *request.group_by_time_s);
-  open.listing = list_images(images, options);
+  if (request.group_by_time_s) {
+    CaptureGroups groups = group_by_capture_time(images, *request.group_by_time_s);
+    options.table = std::move(groups.table);
+    open.listing = list_images(images, options);
+    open.listing.skipped = std::move(groups.skipped);
+  } else {
+    open.listing = list_images(images, options);
+  }
   if (open.listing.images.empty() && !request.allow_empty) {
     throw InputError(fmt::format("{}: holds no photographs", images.string()));
   }
   for (const CampaignImage& image : open.listing.images)
-    open.camera_of_image.push_back(camera_of(campaign, image));
+    open.camera_of_image.push_back(camera_of(open, image));
   return open;
 }
+
+namespace {
+
+// Folders that this process holds: `run` holds its campaign for all of its stages.
+std::set<fs::path>& held_folders() {
+  static std::set<fs::path> held;
+  return held;
+}
+
+}  // namespace
 
 CampaignLock::CampaignLock(const fs::path& results) {
   std::error_code error;
   fs::create_directories(results, error);
   const fs::path path = results / ".lock";
+  folder_ = fs::weakly_canonical(results, error);
+  if (held_folders().count(folder_) != 0) return;
   file_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-  if (file_ < 0) throw InputError(fmt::format("{}: cannot be written", path.string()));
+  if (file_ < 0)
+    throw InputError(fmt::format("{}: cannot be written: {}", path.string(), std::strerror(errno)));
   if (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
     ::close(file_);
     throw InputError(fmt::format("{}: another hexcal is working on this campaign; wait for it or stop it",
                                  results.parent_path().string()));
   }
+  held_folders().insert(folder_);
+  remove_abandoned_files(results);
+  remove_abandoned_files(results / "cache");
 }
 
 CampaignLock::~CampaignLock() {
-  if (file_ >= 0) ::close(file_);
+  if (file_ < 0) return;
+  held_folders().erase(folder_);
+  ::close(file_);
 }
 
 PhotographObservations observe_image(const OpenCampaign& open, std::size_t image, bool use_cache) {
@@ -159,10 +205,10 @@ PhotographObservations observe_image(const OpenCampaign& open, std::size_t image
   }
   seen.name = entry.name;
   if (use_cache && fits && seen.status == PhotographStatus::ok && seen.sha256 == sha) {
-    write_file_atomically(
-        cache_file(open, sha, camera),
-        observations_text(
-            {open.campaign.family, open.camera_sha256[static_cast<std::size_t>(camera)], {seen}}));
+    const std::string& camera_sha256 = open.camera_sha256[static_cast<std::size_t>(camera)];
+    write_file_atomically(cache_file(open, sha, camera),
+                          observations_text({open.campaign.family, camera_sha256, {seen}}),
+                          Keep::unless_power_fails);
   }
   return seen;
 }
@@ -230,6 +276,32 @@ CampaignObservations campaign_observations(const fs::path& file, OpenCampaign& o
   std::sort(observations.poses.begin(), observations.poses.end(), natural_less);
   open.listing.poses = observations.poses;
   return observations;
+}
+
+void judge_against_files(const OpenCampaign& open, CampaignResult& result) {
+  for (std::size_t c = 0; c < open.cameras.size(); ++c) {
+    if (open.cameras[c].covariance.size() > 0) continue;
+    result.warnings.push_back(
+        fmt::format("{} states no covariance: the sigmas of the poses leave the camera's own error out",
+                    open.campaign.cameras[c].file.filename().string()));
+  }
+  if (!open.campaign.targets) return;
+  std::map<std::string, Pose> commanded;
+  try {
+    for (const PoseRecord& record : read_pose_table(*open.campaign.targets)) {
+      if (record.pose) commanded[record.id] = *record.pose;
+    }
+  } catch (const InputError& error) {
+    // The measurement needs no targets.
+    result.warnings.push_back(fmt::format("not compared with the targets: {}", error.what()));
+    return;
+  }
+  std::vector<std::optional<Pose>> targets;
+  for (const MeasuredPose& pose : result.poses) {
+    const auto found = commanded.find(pose.id);
+    targets.push_back(found == commanded.end() ? std::nullopt : std::optional<Pose>(found->second));
+  }
+  judge_swapped_folders(targets, result);
 }
 
 }  // namespace hexcal

@@ -44,7 +44,8 @@ struct OpenCampaign {
 [[nodiscard]] OpenCampaign open_campaign(const MeasureRequest& request);
 
 /// Holds results/.lock while it lives, so that two runs on one campaign do not mix. Throws InputError if
-/// another run holds it. The lock vanishes with the process, however it ends.
+/// another process holds it; inside the process that does, a second one changes nothing. The lock vanishes
+/// with the process, however it ends.
 class CampaignLock {
  public:
   explicit CampaignLock(const std::filesystem::path& results);
@@ -54,6 +55,7 @@ class CampaignLock {
 
  private:
   int file_ = -1;
+  std::filesystem::path folder_;
 };
 
 /// Decodes photographs and finds their markers, one photograph per thread at a time; results are kept in
@@ -72,6 +74,10 @@ class CampaignLock {
 /// pose `folder`.
 [[nodiscard]] CampaignObservations campaign_observations(const std::filesystem::path& file,
                                                          OpenCampaign& open);
+
+/// What the campaign's other files say of the result, as remarks and warnings: folders whose names were
+/// swapped (targets.csv), cameras without a covariance.
+void judge_against_files(const OpenCampaign& open, CampaignResult& result);
 
 /// Writes poses.csv and everything beside it; returns the files written.
 std::vector<std::filesystem::path> write_results(const MeasureRequest& request, const OpenCampaign& open,

@@ -8,6 +8,7 @@
 #include "kinematics/geometry/input_error.h"
 #include "tools/hexcal/campaign_measurement.h"
 #include "tools/hexcal/commands.h"
+#include "tools/hexcal/photograph_heads.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/io/hexapod_file.h"
 #include "tools/io/pose_table.h"
@@ -41,24 +42,9 @@ class Findings {
 };
 
 void check_photographs(const OpenCampaign& open, Findings& findings) {
-  for (std::size_t i = 0; i < open.listing.images.size(); ++i) {
-    const CampaignImage& image = open.listing.images[i];
-    const int index = open.camera_of_image[i];
-    if (index < 0) {
-      findings.bad(fmt::format("{}: no camera file is for it", image.name));
-      continue;
-    }
-    const CalibratedCamera& camera = open.cameras[static_cast<std::size_t>(index)];
-    const PhotographInfo info = read_photograph_info(image.path);
-    if (info.width_px != camera.model.width_px || info.height_px != camera.model.height_px) {
-      findings.bad(fmt::format("{}: {} x {} px, the camera file is for {} x {}", image.name, info.width_px,
-                               info.height_px, camera.model.width_px, camera.model.height_px));
-      continue;
-    }
-    for (const SettingDifference& difference : compare_setting(camera.setting, info)) {
-      const std::string line = fmt::format("{}: {}", image.name, difference.words);
-      difference.fatal ? findings.bad(line) : findings.warn(line);
-    }
+  for (const HeadFinding& finding : inspect_heads(open)) {
+    const std::string line = fmt::format("{}: {}", open.listing.images[finding.image].name, finding.words);
+    finding.bad ? findings.bad(line) : findings.warn(line);
   }
 }
 

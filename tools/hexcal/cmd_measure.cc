@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "kinematics/geometry/input_error.h"
 #include "tools/hexcal/campaign_measurement.h"
 #include "tools/hexcal/commands.h"
+#include "tools/hexcal/photograph_heads.h"
 #include "tools/hexcal/terminal.h"
 
 namespace hexcal {
@@ -20,20 +22,56 @@ struct MeasureFlags {
   bool no_cache = false;
 };
 
-int list_only(const OpenCampaign& open) {
-  for (const std::string& pose : open.listing.poses) {
-    std::string line = pose + ":";
-    int count = 0;
-    for (const CampaignImage& image : open.listing.images) {
-      if (image.pose != pose) continue;
-      ++count;
-      line += ' ' + image.path.filename().string();
+// What would be measured and what is wrong with the folder, as lines for people.
+int list_only(const OpenCampaign& open, const std::vector<HeadFinding>& findings) {
+  const ImageListing& listing = open.listing;
+  int bad = 0;
+  for (const std::string& pose : listing.poses) {
+    std::string names;
+    std::vector<std::string> remarks;
+    int usable = 0;
+    for (std::size_t i = 0; i < listing.images.size(); ++i) {
+      if (listing.images[i].pose != pose) continue;
+      names += ' ' + listing.images[i].path.filename().string();
+      bool image_bad = false;
+      for (const HeadFinding& finding : findings) {
+        if (finding.image != i) continue;
+        image_bad = image_bad || finding.bad;
+        remarks.push_back(fmt::format("{}: {}", listing.images[i].name, finding.words));
+      }
+      (image_bad ? bad : usable) += 1;
     }
-    fmt::print("{}{}\n", line, count == 0 ? " no photographs" : count < 2 ? "  (one photograph only)" : "");
+    fmt::print("{}:{}{}\n", pose, names,
+               usable == 0   ? " no photograph that counts"
+               : usable == 1 ? " (one photograph only)"
+                             : "");
+    for (const std::string& remark : remarks) fmt::print("  {}\n", remark);
+    if (usable == 0) ++bad;
+  }
+  for (const SkippedFile& file : listing.skipped) fmt::print("not used: {}: {}\n", file.name, file.reason);
+  return bad == 0 ? kDone : kSomeFailed;
+}
+
+int list_as_json(const OpenCampaign& open, const std::vector<HeadFinding>& findings) {
+  nlohmann::ordered_json json{{"poses", open.listing.poses},
+                              {"photographs", nlohmann::ordered_json::array()},
+                              {"skipped", nlohmann::ordered_json::array()}};
+  for (std::size_t i = 0; i < open.listing.images.size(); ++i) {
+    const CampaignImage& image = open.listing.images[i];
+    nlohmann::ordered_json row{
+        {"photo", image.name}, {"pose", image.pose}, {"camera", open.camera_of_image[i]}};
+    row["problems"] = nlohmann::ordered_json::array();
+    row["remarks"] = nlohmann::ordered_json::array();
+    for (const HeadFinding& finding : findings) {
+      if (finding.image == i) row[finding.bad ? "problems" : "remarks"].push_back(finding.words);
+    }
+    json["photographs"].push_back(row);
   }
   for (const SkippedFile& file : open.listing.skipped)
-    fmt::print("not used: {}: {}\n", file.name, file.reason);
-  return kDone;
+    json["skipped"].push_back({{"file", file.name}, {"reason", file.reason}});
+  fmt::print("{}\n", json.dump(1));
+  const bool any_bad = std::ranges::any_of(findings, [](const HeadFinding& finding) { return finding.bad; });
+  return any_bad ? kSomeFailed : kDone;
 }
 
 // A camera file that suits no photograph at all is a mistake in the files, not a bad pose: nothing is written
@@ -56,7 +94,10 @@ int measure(MeasureFlags flags) {
   request.interior_fixed = flags.interior == "fixed";
   request.cache = !flags.no_cache;
   OpenCampaign open = open_campaign(request);
-  if (flags.dry_run) return list_only(open);
+  if (flags.dry_run) {
+    const std::vector<HeadFinding> findings = inspect_heads(open);
+    return flags.json ? list_as_json(open, findings) : list_only(open, findings);
+  }
   const CampaignLock lock(open.results);
   CampaignObservations observations;
   if (request.observations) {
@@ -65,8 +106,9 @@ int measure(MeasureFlags flags) {
     ProgressBar progress("photographs", open.listing.images.size());
     observations = observe_campaign(request, open, [&progress] { progress.advance(); });
   }
-  const CampaignResult result = extract_poses(open.campaign, observations, extract_options(request));
+  CampaignResult result = extract_poses(open.campaign, observations, extract_options(request));
   refuse_foreign_camera(request.campaign, observations, result);
+  judge_against_files(open, result);
   const std::vector<std::filesystem::path> written = write_results(request, open, observations, result);
   if (flags.json) {
     fmt::print("{}", measurement_json(observations, result, open.listing));

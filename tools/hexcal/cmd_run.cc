@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "tools/hexcal/campaign_measurement.h"
 #include "tools/hexcal/commands.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/io/campaign_file.h"
@@ -36,6 +37,7 @@ int run_stage(void (*add)(CLI::App&, Action&), std::vector<std::string> argument
 
 int run_run(const RunFlags& flags) {
   const Campaign campaign = read_campaign(flags.campaign);
+  const CampaignLock lock(campaign.folder / "results");
   int worst = run_stage(add_measure_command, {"measure", flags.campaign});
   if (campaign.hexapod && campaign.targets) {
     std::vector<std::string> arguments{"compensate", flags.campaign};

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <csignal>
 #include <cstdio>
 #include <exception>
 
@@ -8,6 +9,7 @@
 #include "tools/hexcal/version.h"
 
 int main(int argc, char** argv) {
+  std::signal(SIGXFSZ, SIG_IGN);  // a file size limit is an error of the write that meets it, with words
   CLI::App app{"hexcal: calibration of a Stewart platform by photographs", "hexcal"};
   app.set_version_flag("--version", fmt::format("hexcal {}", hexcal::kVersion));
   app.require_subcommand(1);

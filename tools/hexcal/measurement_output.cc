@@ -38,6 +38,7 @@ std::vector<PoseRecord> pose_records(const CampaignResult& result) {
     record.images = pose.images;
     record.markers = pose.markers;
     if (pose.pose) record.rms_px = pose.rms_px;
+    if (pose.status == PoseStatus::ok) record.remarks = pose.words;
     records.push_back(std::move(record));
   }
   return records;
@@ -65,10 +66,9 @@ std::vector<fs::path> write_results(const MeasureRequest& request, const OpenCam
   }
   if (request.observations) inputs.push_back(*request.observations);
   const std::string head = provenance_line(kVersion, "measure", inputs);
-  std::vector<fs::path> written;
-  const auto write = [&](const fs::path& path, const std::string& text) {
-    write_file_atomically(path, text);
-    written.push_back(path);
+  std::vector<std::pair<fs::path, std::string>> files;
+  const auto write = [&](const fs::path& path, std::string text) {
+    files.emplace_back(path, std::move(text));
   };
   DetectionSet set{open.campaign.family, open.camera_sha256.size() == 1 ? open.camera_sha256[0] : "", {}};
   for (const CampaignPhotograph& photograph : observations.photographs) {
@@ -92,13 +92,16 @@ std::vector<fs::path> write_results(const MeasureRequest& request, const OpenCam
       write(open.results / "colmap" / name, text);
     }
   }
+  // Last: whoever waits for poses.csv finds the rest.
+  write(open.poses_csv, format_pose_table(head, pose_records(result), PoseColumns::measured));
+  write_files_atomically(files);
+  std::vector<fs::path> written;
+  for (const auto& [path, text] : files) written.push_back(path);
   if (request.overlays && !request.observations) {
     for (std::size_t p = 0; p < observations.photographs.size(); ++p) {
       if (const auto path = write_overlay(open, observations, result, p)) written.push_back(*path);
     }
   }
-  // Last: whoever waits for poses.csv finds the rest.
-  write(open.poses_csv, format_pose_table(head, pose_records(result), PoseColumns::measured));
   return written;
 }
 

@@ -1,5 +1,7 @@
 #include "tools/hexcal/overlay_image.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -13,28 +15,94 @@ namespace {
 constexpr double kMagnification = 200;
 constexpr int kJpegQuality = 85;
 
-cv::Point pixel(const Eigen::Vector2d& px) { return {cvRound(px.x()), cvRound(px.y())}; }
+constexpr double kDimming = 0.75;     // so that the drawing stands out
+constexpr int kSubpixelBits = 4;      // OpenCV draws in sixteenths of a pixel
+constexpr double kScaleBarPx = 0.05;  // residual that the legend shows
+
+cv::Point fine(const Eigen::Vector2d& px) {
+  return {cvRound(px.x() * (1 << kSubpixelBits)), cvRound(px.y() * (1 << kSubpixelBits))};
+}
+
+void draw_line(cv::Mat& image, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
+               const cv::Scalar& colour, int width) {
+  cv::line(image, fine(from), fine(to), colour, width, cv::LINE_AA, kSubpixelBits);
+}
+
+// Dark under light, so that it reads on any ground. `height_px` is that of a capital letter.
+void draw_text(cv::Mat& image, const std::string& text, const Eigen::Vector2d& centre, double height_px,
+               const cv::Scalar& colour) {
+  const double scale = height_px / 21;  // FONT_HERSHEY_SIMPLEX is 21 px high at scale 1
+  const int width = std::max(1, cvRound(1.6 * scale));
+  int base = 0;
+  const cv::Size size = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, scale, width, &base);
+  const cv::Point at(cvRound(centre.x() - 0.5 * size.width), cvRound(centre.y() + 0.5 * size.height));
+  cv::putText(image, text, at, cv::FONT_HERSHEY_SIMPLEX, scale, cv::Scalar(0, 0, 0), 3 * width, cv::LINE_AA);
+  cv::putText(image, text, at, cv::FONT_HERSHEY_SIMPLEX, scale, colour, width, cv::LINE_AA);
+}
+
+// Why a marker does not count.
+std::string reason_of(const Sighting* sighting, const MarkerObservation& seen) {
+  if (sighting == nullptr) return marker_status_name(seen.status);
+  switch (sighting->status) {
+    case SightingStatus::used:
+      return "";
+    case SightingStatus::not_measured:
+      return marker_status_name(seen.status);
+    case SightingStatus::unknown_id:
+      return "not of this campaign";
+    case SightingStatus::repeated_id:
+      return "id twice";
+    case SightingStatus::seen_once:
+      return "seen once";
+    case SightingStatus::unoriented:
+      return "not connected";
+    case SightingStatus::outlier:
+      return "contradicts the rest";
+  }
+  return "";
+}
+
+const cv::Scalar kUsed(90, 220, 90);
+const cv::Scalar kRejected(60, 60, 255);
+const cv::Scalar kNotMeasured(190, 190, 190);
+const cv::Scalar kResidual(0, 200, 255);
 
 void draw_marker(const Sighting* sighting, const MarkerObservation& seen, const Vector8d& residual_px,
                  cv::Mat& image) {
   const bool used = sighting != nullptr && sighting->status == SightingStatus::used;
   const bool rejected = sighting != nullptr && sighting->status == SightingStatus::outlier;
-  const cv::Scalar colour = used       ? cv::Scalar(60, 200, 60)
-                            : rejected ? cv::Scalar(50, 50, 230)
-                                       : cv::Scalar(160, 160, 160);
-  const int width = std::max(1, image.cols / 2000);
+  const cv::Scalar& colour = used ? kUsed : rejected ? kRejected : kNotMeasured;
+  const int width = std::max(1, image.cols / 1500);
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
   for (std::size_t c = 0; c < 4; ++c) {
-    cv::line(image, pixel(seen.corners_px[c]), pixel(seen.corners_px[(c + 1) % 4]), colour, width,
-             cv::LINE_AA);
-    if (used || rejected) {
-      const Eigen::Vector2d end =
-          seen.corners_px[c] + kMagnification * residual_px.segment<2>(2 * static_cast<Eigen::Index>(c));
-      cv::arrowedLine(image, pixel(seen.corners_px[c]), pixel(end), cv::Scalar(0, 200, 255), width,
-                      cv::LINE_AA);
-    }
+    draw_line(image, seen.corners_px[c], seen.corners_px[(c + 1) % 4], colour, width);
+    centre += seen.corners_px[c] / 4;
   }
-  cv::putText(image, std::to_string(seen.id), pixel(seen.corners_px[0]), cv::FONT_HERSHEY_SIMPLEX,
-              image.cols / 3000.0, colour, 2 * width, cv::LINE_AA);
+  for (std::size_t c = 0; c < 4 && (used || rejected); ++c) {
+    const Eigen::Vector2d end =
+        seen.corners_px[c] + kMagnification * residual_px.segment<2>(2 * static_cast<Eigen::Index>(c));
+    draw_line(image, seen.corners_px[c], end, kResidual, 2 * width);
+    cv::circle(image, fine(end), fine({1.5 * width, 0}).x, kResidual, cv::FILLED, cv::LINE_AA, kSubpixelBits);
+  }
+  const double height = std::clamp(0.22 * seen.side_px, image.cols / 120.0, image.cols / 30.0);
+  draw_text(image, std::to_string(seen.id), centre, height, colour);
+  if (!used) {
+    draw_text(image, reason_of(sighting, seen), centre + Eigen::Vector2d(0, 1.3 * height), 0.55 * height,
+              colour);
+  }
+}
+
+// What the drawing means, at the foot of it.
+void draw_legend(const std::string& text, cv::Mat& image) {
+  const double height = image.cols / 75.0;
+  const Eigen::Vector2d foot(0, image.rows - 1.5 * height);
+  const double length = kMagnification * kScaleBarPx;
+  const Eigen::Vector2d start = foot + Eigen::Vector2d(2 * height, 0);
+  draw_line(image, start, start + Eigen::Vector2d(length, 0), kResidual, std::max(2, image.cols / 750));
+  const std::string all = fmt::format("{} px, x{:.0f}    {}", kScaleBarPx, kMagnification, text);
+  int base = 0;
+  const cv::Size size = cv::getTextSize(all, cv::FONT_HERSHEY_SIMPLEX, height / 21, 1, &base);
+  draw_text(image, all, start + Eigen::Vector2d(length + height + 0.5 * size.width, 0), height, kNotMeasured);
 }
 
 }  // namespace
@@ -48,7 +116,7 @@ std::optional<std::filesystem::path> write_overlay(const OpenCampaign& open,
   cv::Mat grey = read.grey;
   if (grey.depth() == CV_16U) grey.convertTo(grey, CV_8U, 1.0 / 257);
   cv::Mat image;
-  cv::cvtColor(grey, image, cv::COLOR_GRAY2BGR);
+  cv::cvtColor(kDimming * grey, image, cv::COLOR_GRAY2BGR);
   for (const MarkerObservation& seen : observations.photographs[photograph].seen.markers) {
     const Sighting* found = nullptr;
     Vector8d residual = Vector8d::Zero();
@@ -61,11 +129,19 @@ std::optional<std::filesystem::path> write_overlay(const OpenCampaign& open,
     }
     draw_marker(found, seen, residual, image);
   }
+  const MeasuredPhotograph& measured = result.photographs[photograph];
+  draw_legend(
+      measured.status == PhotoStatus::ok
+          ? fmt::format("{}: {} markers, {} rejected, rms {:.4f} px", entry.name, measured.residuals.markers,
+                        measured.residuals.rejected, measured.residuals.rms_px)
+          : fmt::format("{}: {}: {}", entry.name, photo_status_name(measured.status), measured.words),
+      image);
   std::vector<unsigned char> bytes;
   cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
   std::string name = entry.name;
   std::replace(name.begin(), name.end(), '/', '_');
-  const std::filesystem::path path = open.results / "overlays" / (name + ".jpg");
+  const bool is_jpeg = name.ends_with(".jpg") || name.ends_with(".JPG");
+  const std::filesystem::path path = open.results / "overlays" / (is_jpeg ? name : name + ".jpg");
   write_file_atomically(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   return path;
 }

@@ -5,10 +5,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
+#include <charconv>
+#include <csignal>
 #include <cstring>
 #include <fstream>
-#include <memory>
+#include <optional>
 
 #include "kinematics/geometry/input_error.h"
 #include "photogrammetry/photograph/sha256.h"
@@ -20,43 +23,89 @@ namespace {
   throw InputError(fmt::format("{}: cannot {}: {}", path.string(), what, std::strerror(errno)));
 }
 
-// Removes the temporary file unless it has been renamed.
+constexpr std::string_view kTemporaryEnding = ".tmp";
+
+// ".NAME.PROCESS.NUMBER.tmp": two threads may write one name at a time.
+std::string temporary_name(const std::string& name) {
+  static std::atomic<unsigned> number{0};
+  return fmt::format(".{}.{}.{}{}", name, ::getpid(), number++, kTemporaryEnding);
+}
+
+// Process that made a temporary name; none if it is not one.
+std::optional<pid_t> maker_of(std::string_view name) {
+  if (!name.starts_with('.') || !name.ends_with(kTemporaryEnding)) return std::nullopt;
+  name.remove_suffix(kTemporaryEnding.size());
+  const std::size_t number = name.rfind('.');
+  const std::size_t process = number == 0 ? number : name.rfind('.', number - 1);
+  pid_t pid = 0;
+  if (process == std::string_view::npos || process == number) return std::nullopt;
+  const auto [rest, error] = std::from_chars(name.data() + process + 1, name.data() + number, pid);
+  if (error != std::errc() || rest != name.data() + number || pid <= 0) return std::nullopt;
+  return pid;
+}
+
+// A file under a temporary name beside its target; removed unless it has been renamed.
 class TemporaryFile {
  public:
-  explicit TemporaryFile(const std::filesystem::path& target)
-      : path_(target.parent_path() / fmt::format(".{}.{}.tmp", target.filename().string(), ::getpid())) {
+  TemporaryFile(const std::filesystem::path& path, std::string_view contents)
+      : target_(path.has_parent_path() ? path : std::filesystem::path(".") / path),
+        path_(target_.parent_path() / temporary_name(target_.filename().string())) {
+    std::error_code error;
+    std::filesystem::create_directories(target_.parent_path(), error);
+    if (error)
+      throw InputError(fmt::format("{}: cannot create: {}", target_.parent_path().string(), error.message()));
+    if (std::filesystem::is_directory(target_, error)) {
+      throw InputError(fmt::format("{}: is a folder, wanted a file name to write", path.string()));
+    }
     descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
-    if (descriptor_ < 0) fail(target, "write");
+    if (descriptor_ < 0) fail(target_, "write");
+    try {
+      write(contents);
+    } catch (...) {
+      remove();
+      throw;
+    }
   }
   TemporaryFile(const TemporaryFile&) = delete;
   TemporaryFile& operator=(const TemporaryFile&) = delete;
-  ~TemporaryFile() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-    if (!renamed_) ::unlink(path_.c_str());
+  TemporaryFile(TemporaryFile&& other) noexcept
+      : target_(std::move(other.target_)), path_(std::move(other.path_)), descriptor_(other.descriptor_) {
+    other.descriptor_ = -1;
+    other.path_.clear();
+  }
+  ~TemporaryFile() { remove(); }
+
+  void flush() {
+    if (::fsync(descriptor_) != 0 && errno != EINVAL) fail(target_, "write");
   }
 
-  void write(std::string_view contents, const std::filesystem::path& target) {
-    while (!contents.empty()) {
-      const ssize_t count = ::write(descriptor_, contents.data(), contents.size());
-      if (count < 0 && errno == EINTR) continue;
-      if (count < 0) fail(target, "write");
-      contents.remove_prefix(static_cast<std::size_t>(count));
-    }
-  }
-
-  void rename_to(const std::filesystem::path& target) {
-    if (::fsync(descriptor_) != 0 && errno != EINVAL) fail(target, "write");
+  void rename_to_target() {
     const int closed = ::close(descriptor_);
     descriptor_ = -1;
-    if (closed != 0) fail(target, "write");
-    if (::rename(path_.c_str(), target.c_str()) != 0) fail(target, "write");
-    renamed_ = true;
+    if (closed != 0 || ::rename(path_.c_str(), target_.c_str()) != 0) fail(target_, "write");
+    path_.clear();
   }
 
  private:
-  std::filesystem::path path_;
+  void write(std::string_view contents) const {
+    while (!contents.empty()) {
+      const ssize_t count = ::write(descriptor_, contents.data(), contents.size());
+      if (count < 0 && errno == EINTR) continue;
+      if (count < 0) fail(target_, "write");
+      contents.remove_prefix(static_cast<std::size_t>(count));
+    }
+    // The disk may begin now; whoever flushes several files waits for them together.
+    (void)::sync_file_range(descriptor_, 0, 0, SYNC_FILE_RANGE_WRITE);
+  }
+
+  void remove() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+    if (!path_.empty()) ::unlink(path_.c_str());
+  }
+
+  std::filesystem::path target_;
+  std::filesystem::path path_;  // empty once it is renamed
   int descriptor_ = -1;
-  bool renamed_ = false;
 };
 
 }  // namespace
@@ -74,18 +123,28 @@ std::string read_file(const std::filesystem::path& path) {
   return contents;
 }
 
-void write_file_atomically(const std::filesystem::path& path, std::string_view contents) {
-  const std::filesystem::path target = path.has_parent_path() ? path : std::filesystem::path(".") / path;
+void write_file_atomically(const std::filesystem::path& path, std::string_view contents, Keep keep) {
+  TemporaryFile file(path, contents);
+  if (keep == Keep::always) file.flush();
+  file.rename_to_target();
+}
+
+void write_files_atomically(const std::vector<std::pair<std::filesystem::path, std::string>>& files) {
+  std::vector<TemporaryFile> written;
+  written.reserve(files.size());
+  for (const auto& [path, text] : files) written.emplace_back(path, text);
+  for (TemporaryFile& file : written) file.flush();
+  for (TemporaryFile& file : written) file.rename_to_target();
+}
+
+void remove_abandoned_files(const std::filesystem::path& folder) {
   std::error_code error;
-  std::filesystem::create_directories(target.parent_path(), error);
-  if (error)
-    throw InputError(fmt::format("{}: cannot create: {}", target.parent_path().string(), error.message()));
-  if (std::filesystem::is_directory(target, error)) {
-    throw InputError(fmt::format("{}: is a folder, wanted a file name to write", path.string()));
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    const auto maker = maker_of(entry.path().filename().string());
+    const bool alive = maker && (::kill(*maker, 0) == 0 || errno == EPERM);
+    std::error_code ignored;
+    if (maker && !alive) std::filesystem::remove(entry.path(), ignored);
   }
-  TemporaryFile temporary(target);
-  temporary.write(contents, target);
-  temporary.rename_to(target);
 }
 
 std::string provenance_line(std::string_view version, std::string_view command,

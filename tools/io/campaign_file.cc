@@ -188,11 +188,6 @@ std::vector<CampaignCamera> read_cameras(const YamlMap& top, const std::filesyst
     cameras.push_back(camera);
   }
   if (cameras.empty()) top.fail("camera", "is empty, wanted a camera file");
-  for (const CampaignCamera& camera : cameras) {
-    if (cameras.size() > 1 && camera.serial.empty() && camera.folder.empty()) {
-      top.fail("camera", "with several cameras each needs serial or folder");
-    }
-  }
   return cameras;
 }
 

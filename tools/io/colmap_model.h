@@ -9,9 +9,9 @@
 namespace hexcal {
 
 /// COLMAP's text model (cameras.txt, images.txt, points3D.txt) as (name, contents), for its viewer: stations
-/// and markers in the fixed body's frame, moving markers where they stood at the first measured pose. The
-/// lens is written as FULL_OPENCV where hexcal's model is one of OpenCV's, else as PINHOLE: a picture, not a
-/// calibration.
+/// and marker corners in UG with the observations that carry them; a moving corner is one point per pose. The
+/// lens is written as FULL_OPENCV where hexcal's model is one of OpenCV's, else as PINHOLE with the
+/// observations freed of the distortion: a picture, not a calibration.
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> format_colmap_model(
     const CampaignObservations& observations, const CampaignResult& result);
 

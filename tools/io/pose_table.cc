@@ -62,6 +62,7 @@ std::vector<PoseRecord> read_pose_table(const std::filesystem::path& path) {
     if (table.has_column("images")) record.images = table.integer(row, "images");
     if (table.has_column("markers")) record.markers = table.integer(row, "markers");
     if (table.has_column("rms_px")) record.rms_px = table.optional_number(row, "rms_px");
+    if (table.has_column("remarks")) record.remarks = table.text(row, "remarks");
     records.push_back(std::move(record));
   }
   return records;
@@ -76,7 +77,7 @@ std::string format_pose_table(const std::string& head, const std::vector<PoseRec
   for (const char* name : kPoseColumns) out += fmt::format(",{}", name);
   if (measured) {
     for (const char* name : kPoseColumns) out += fmt::format(",sigma_{}", name);
-    out += ",images,markers,rms_px";
+    out += ",images,markers,rms_px,remarks";
   }
   out += '\n';
   for (const PoseRecord& record : records) {
@@ -98,6 +99,7 @@ std::string format_pose_table(const std::string& head, const std::vector<PoseRec
       }
       out += fmt::format(",{},{},", record.images.value_or(0), record.markers.value_or(0));
       if (record.rms_px) out += fmt::format("{:.4f}", *record.rms_px);
+      out += ',' + csv_field(record.remarks);
     }
     out += '\n';
   }

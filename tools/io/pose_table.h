@@ -26,6 +26,7 @@ struct PoseRecord {
   std::optional<int> images;
   std::optional<int> markers;
   std::optional<double> rms_px;
+  std::string remarks{};  ///< what should be known of a pose that is ok
 };
 
 /// Reads a pose table (columns pose,x_mm,...,yaw_deg and optional others). Duplicate ids are an error. A row
@@ -35,7 +36,7 @@ struct PoseRecord {
 enum class PoseColumns {
   target,     ///< pose,x_mm,...,yaw_deg
   predicted,  ///< pose,status,x_mm,...,yaw_deg
-  measured,   ///< pose,status,x_mm,...,yaw_deg,sigma_x_mm,...,sigma_yaw_deg,images,markers,rms_px
+  measured,   ///< pose,status,x_mm,...,yaw_deg,sigma_x_mm,...,sigma_yaw_deg,images,markers,rms_px,remarks
 };
 
 /// Text of a pose table; `head` is its comment lines. Numbers carry 1e-6 mm and 1e-7 deg.
