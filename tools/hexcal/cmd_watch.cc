@@ -30,6 +30,8 @@ constexpr int kBusyPollMs = 50;
 // does not decode, and a file that changes again is looked at again.
 constexpr auto kStable = std::chrono::milliseconds(200);
 constexpr auto kGiveUp = std::chrono::seconds(20);  // an undecodable file counts as bad after this long
+// Poses that become complete within this time are measured together.
+constexpr auto kGather = std::chrono::milliseconds(400);
 constexpr auto kRename =
     std::chrono::milliseconds(1500);  // a file that vanished may turn up under another name
 constexpr double kGoodSigmaMm = 0.01;
