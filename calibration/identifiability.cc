@@ -189,6 +189,40 @@ std::vector<LegDiagnosis> diagnose_legs(const IdentifyResult& identified) {
   return legs;
 }
 
+std::vector<std::string> describe_extensions(const IdentifyResult& identified) {
+  const ParameterLayout& layout = identified.layout;
+  const auto sigma_of = [&](int parameter) {
+    const int free = identified.selection.free_of[static_cast<std::size_t>(parameter)];
+    return free < 0 ? 0.0 : std::sqrt(identified.covariance(free, free));
+  };
+  std::vector<std::string> sentences;
+  if (layout.curve_terms > 0) {
+    std::string sizes;
+    for (const StrokeCurve& curve : identified.machine.stroke_curves) {
+      constexpr int kSteps = 50;
+      double most = 0;
+      for (int i = 0; i <= kSteps; ++i)
+        most = std::max(most, std::abs(curve.value_mm(curve.low + i * (curve.high - curve.low) / kSteps)));
+      sizes += fmt::format("{:.3f} ", most);
+    }
+    sentences.push_back(fmt::format("stroke curves of the legs up to {}mm", sizes));
+  }
+  if (sigma_of(layout.sag()) > 0)
+    sentences.push_back(
+        fmt::format("legs give by {:.3f} mm +- {:.3f} mm under a pull of the moving mass's weight",
+                    identified.machine.sag[0], sigma_of(layout.sag())));
+  if (sigma_of(layout.backlash()) > 0) {
+    std::string sizes;
+    double squares = 0;
+    for (int leg = 0; leg < 6; ++leg) {
+      sizes += fmt::format("{:.3f} ", identified.machine.backlash_mm[leg]);
+      squares += std::pow(sigma_of(layout.backlash() + leg), 2);
+    }
+    sentences.push_back(fmt::format("backlash of the legs {}mm +- {:.3f} mm", sizes, std::sqrt(squares / 6)));
+  }
+  return sentences;
+}
+
 }  // namespace
 
 Identifiability judge_identifiability(const PlatformGeometry& nominal, const IdentifyResult& identified) {
@@ -252,6 +286,7 @@ Identifiability judge_identifiability(const PlatformGeometry& nominal, const Ide
                    });
   if (judged.correlations.size() > 10) judged.correlations.resize(10);
   judged.legs = diagnose_legs(identified);
+  judged.beyond_geometry = describe_extensions(identified);
   return judged;
 }
 

@@ -45,6 +45,9 @@ struct Identifiability {
   std::vector<WeakDirection> weak;           ///< weakest first, at most ten
   std::string advice;  ///< which poses would determine most of what is weak; empty when nothing is
   std::vector<LegDiagnosis> legs;
+  /// What the model has beyond geometry, a sentence each: "backlash of the legs 0.049 0.051 ... mm +- 0.002
+  /// mm", stroke curves, sag.
+  std::vector<std::string> beyond_geometry;
 };
 
 [[nodiscard]] Identifiability judge_identifiability(const PlatformGeometry& nominal,

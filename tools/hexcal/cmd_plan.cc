@@ -3,14 +3,17 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "calibration/plan_poses.h"
 #include "kinematics/geometry/input_error.h"
 #include "kinematics/sampling.h"
 #include "tools/hexcal/command.h"
+#include "tools/hexcal/marker_visibility.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/camera_file.h"
 #include "tools/io/campaign_file.h"
 #include "tools/io/hexapod_file.h"
 #include "tools/io/pose_table.h"
@@ -27,6 +30,8 @@ struct PlanFlags {
   double position_sigma_mm = 0.05;
   double orientation_sigma_deg = 0.02;
   double max_tilt_deg = 60;
+  std::string frames = "known";
+  bool any_station = false;
   std::uint64_t seed = 1;
   bool json = false;
 };
@@ -41,10 +46,31 @@ std::vector<Pose> poses_of(const fs::path& path, std::vector<std::string>* ids =
   return poses;
 }
 
+// Leaves the candidates that pass, and their ids where they have any.
+template <typename Condition>
+void keep_if(std::vector<Pose>& candidates, std::vector<std::string>& ids, const Condition& condition) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    if (!condition(candidates[i])) continue;
+    candidates[kept] = candidates[i];
+    if (!ids.empty()) ids[kept] = ids[i];
+    ++kept;
+  }
+  candidates.resize(kept);
+  if (!ids.empty()) ids.resize(kept);
+}
+
 int run_plan(PlanFlags flags) {
   constexpr std::size_t kCandidates = 2000;
+  std::optional<MeasuredNetwork> network;
+  CameraModel camera;
   if (!flags.campaign.empty()) {
     const Campaign campaign = read_campaign(flags.campaign);
+    const fs::path results = campaign.folder / "results";
+    if (!flags.any_station && fs::exists(results / "photos.csv") && fs::exists(results / "markers.csv")) {
+      network = read_measured_network(results);
+      camera = read_camera_file(campaign.cameras.front().file).model;
+    }
     if (flags.hexapod.empty() && campaign.hexapod) flags.hexapod = *campaign.hexapod;
     if (campaign.targets && fs::exists(*campaign.targets)) flags.targets = *campaign.targets;
   }
@@ -59,10 +85,17 @@ int run_plan(PlanFlags flags) {
   } else {
     candidates = poses_of(flags.candidates, &ids);
   }
-  for (std::size_t i = candidates.size(); i-- > 0;) {
-    if (tilt_rad(candidates[i]) * kDegPerRad <= flags.max_tilt_deg) continue;
-    candidates.erase(candidates.begin() + static_cast<std::ptrdiff_t>(i));
-    if (!ids.empty()) ids.erase(ids.begin() + static_cast<std::ptrdiff_t>(i));
+  keep_if(candidates, ids,
+          [&](const Pose& pose) { return tilt_rad(pose) * kDegPerRad <= flags.max_tilt_deg; });
+  const std::size_t unseen_and_seen = candidates.size();
+  if (network) {
+    keep_if(candidates, ids,
+            [&](const Pose& pose) { return can_be_measured(*network, camera, pose, nominal.gd_mm); });
+    if (candidates.size() < flags.count)
+      throw InputError(fmt::format(
+          "{} of {} candidate poses can be measured from the stations in results/photos.csv, wanted at least "
+          "{} (--any-station plans without them)",
+          candidates.size(), unseen_and_seen, flags.count));
   }
   std::vector<Pose> load_paths;
   if (!flags.load_paths.empty()) {
@@ -84,6 +117,7 @@ int run_plan(PlanFlags flags) {
   options.criterion = flags.criterion == "d" ? PlanCriterion::d_optimal : PlanCriterion::i_optimal;
   options.position_sigma_mm = flags.position_sigma_mm;
   options.orientation_sigma_deg = flags.orientation_sigma_deg;
+  options.identify.frames_unknown = flags.frames == "unknown";
   const PosePlan plan = plan_poses(nominal, candidates, load_paths, options);
 
   std::vector<PoseRecord> records;
@@ -101,6 +135,7 @@ int run_plan(PlanFlags flags) {
       flags.out, format_pose_table(provenance_line(kVersion, "plan", inputs), records, PoseColumns::target));
   if (flags.json) {
     nlohmann::ordered_json out{{"written", flags.out.string()}, {"exchanges", plan.exchanges}};
+    if (network) out["candidates_out_of_sight"] = unseen_and_seen - candidates.size();
     for (const PoseRecord& record : records) out["poses"].push_back(record.id);
     for (std::size_t i = 0; i < plan.by_count.size(); ++i) {
       out["predicted"].push_back({{"poses", plan.by_count[i].poses},
@@ -122,6 +157,9 @@ int run_plan(PlanFlags flags) {
   }
   fmt::print("predicted error that remains after compensation, for poses measured to {} mm and {} deg\n{}",
              flags.position_sigma_mm, flags.orientation_sigma_deg, table.text());
+  if (network)
+    fmt::print("{} of {} candidates can be measured from the stations of the campaign's photographs\n",
+               candidates.size(), unseen_and_seen);
   fmt::print("wrote {} poses of {} candidates to {}\n", records.size(), candidates.size(),
              flags.out.string());
   return kDone;
@@ -132,7 +170,10 @@ int run_plan(PlanFlags flags) {
 void add_plan_command(CLI::App& app, Action& action) {
   const auto flags = std::make_shared<PlanFlags>();
   CLI::App* command = app.add_subcommand("plan", "Choose the poses that identify the machine best");
-  command->add_option("campaign", flags->campaign, "campaign folder that names hexapod.yaml");
+  command->add_option(
+      "campaign", flags->campaign,
+      "campaign folder that names hexapod.yaml; once it is measured, only poses are planned whose moving "
+      "markers its stations see");
   command->add_option("--hexapod", flags->hexapod, "nominal geometry (hexapod.yaml)");
   command->add_option("-n,--poses", flags->count, "number of poses")->capture_default_str();
   command
@@ -147,6 +188,11 @@ void add_plan_command(CLI::App& app, Action& action) {
   command
       ->add_option("--max-tilt-deg", flags->max_tilt_deg,
                    "tilt up to which the cameras see the moving markers")
+      ->capture_default_str();
+  command->add_flag("--any-station", flags->any_station,
+                    "plan also what the stations of the measured campaign do not see");
+  command->add_option("--frames", flags->frames, "known, or unknown: as compensate will be asked")
+      ->check(CLI::IsMember({"known", "unknown"}))
       ->capture_default_str();
   command->add_option("--sigma-mm", flags->position_sigma_mm, "noise of measured positions")
       ->capture_default_str();

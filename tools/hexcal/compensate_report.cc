@@ -78,6 +78,7 @@ std::string diagnosis(const CalibrationReport& report) {
                       identified.leg_sigma_mm);
   for (const LegDiagnosis& leg : judged.legs)
     text += fmt::format("{} {}\n", leg.wrong ? "!" : " ", leg.sentence);
+  for (const std::string& sentence : judged.beyond_geometry) text += fmt::format("  {}\n", sentence);
   for (std::size_t i = 0; i < std::min<std::size_t>(3, judged.correlations.size()); ++i) {
     const CorrelatedPair& pair = judged.correlations[i];
     text += fmt::format("  {} and {} cannot be told apart (correlation {:+.3f})\n", pair.a, pair.b,
@@ -132,7 +133,8 @@ Json json_of_identified(const IdentifyResult& identified, const Identifiability&
            {"position_sigma_mm", identified.position_sigma_mm},
            {"orientation_sigma_deg", identified.orientation_sigma_rad * kDegPerRad},
            {"leg_sigma_mm", identified.leg_sigma_mm},
-           {"advice", judged.advice}};
+           {"advice", judged.advice},
+           {"beyond_geometry", judged.beyond_geometry}};
   for (const ParameterReport& p : judged.parameters)
     out["parameters"].push_back({{"name", p.name},
                                  {"unit", p.unit},
