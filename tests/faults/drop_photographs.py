@@ -89,8 +89,6 @@ def main():
         poses = sorted(p.name for p in (args.campaign / "poses").iterdir())
         poses = ["home"] + [p for p in poses if p != "home"][:args.poses]
         left = {pose: sorted((args.campaign / "poses" / pose).iterdir()) for pose in poses}
-        for pose in poses:
-            (lab / "poses" / pose).mkdir(parents=True)
         watch = subprocess.Popen([*args.prefix.split(), args.hexcal, "watch", lab], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                                  text=True)
         reader = Reader(watch.stdout)
@@ -101,6 +99,7 @@ def main():
         complete = {}
         for pose, file in queue:
             target = lab / "poses" / pose / file.name
+            target.parent.mkdir(parents=True, exist_ok=True)
             when, _ = drop(file, target, rng)
             left[pose].remove(file)
             if not left[pose]:

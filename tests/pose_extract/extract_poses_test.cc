@@ -10,6 +10,7 @@ namespace {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 // A campaign on which each test plays one fault; healthy poses must stay within twice their clean error.
 class ExtractPoses : public ::testing::Test {
@@ -316,6 +317,36 @@ TEST_F(ExtractPoses, ScaleFromNominalCoordinatesOverridesMisprintedSizes) {
   made_.campaign.scale = ScaleFrom::nominal;
   const CampaignResult result = extract();
   EXPECT_NEAR(result.UG.scale, 1.01, 1e-4);
+  EXPECT_THAT(result.warnings, Contains(HasSubstr("printed 1.0")));
+}
+
+TEST_F(ExtractPoses, BarsGiveTheScaleAndSayHowTheMarkersWerePrinted) {
+  ObservationSceneOptions options;
+  options.num_epochs = 5;
+  options.noise_px = 0.01;
+  options.print_scale = 0.01;
+  made_ = make_campaign_scene(options);
+  const auto distance = [&](std::size_t a, std::size_t b) {
+    return (made_.scene.body_from_marker[a].translation - made_.scene.body_from_marker[b].translation).norm();
+  };
+  made_.campaign.scale = ScaleFrom::bars;
+  made_.campaign.bars = {{{0, -1}, {4, -1}, distance(0, 4), 0.002},
+                         {{5, -1}, {9, -1}, distance(5, 9), 0.002}};
+  const CampaignResult agreeing = extract();
+  EXPECT_THAT(agreeing.warnings, Contains(HasSubstr("the markers are printed 1.0")));
+  EXPECT_THAT(agreeing.warnings, Not(Contains(HasSubstr("bar "))));
+  made_.campaign.bars[1].length_mm += 0.05;
+  EXPECT_THAT(extract_poses(made_.campaign, made_.observations).warnings,
+              Contains(HasSubstr("bar 5-9: measured")));
+}
+
+TEST_F(ExtractPoses, ResidualsFarBeyondTheirPromiseAreSaidInEveryPose) {
+  for (CampaignPhotograph& photograph : made_.observations.photographs) {
+    for (MarkerObservation& marker : photograph.seen.markers) marker.covariance_px2 *= 0.01;
+  }
+  const CampaignResult result = extract();
+  EXPECT_THAT(result.warnings, Contains(HasSubstr("times what the photographs promise")));
+  EXPECT_THAT(pose(result, "p01").words, HasSubstr("residuals are too large"));
 }
 
 TEST_F(ExtractPoses, OnlyFixedMarkersIsAPlainPhotogrammetryProject) {

@@ -121,6 +121,7 @@ OpenCampaign open_campaign(const MeasureRequest& request) {
     if (!camera.folder.empty()) options.camera_folders.push_back(camera.folder);
   }
   const fs::path images = request.poses_dir.value_or(campaign.images);
+  if (request.allow_empty && !fs::exists(images)) return open;
   if (campaign.images_table && !request.poses_dir) {
     for (const ImageRow& row : read_images_table(*campaign.images_table))
       options.table.emplace_back(row.file, row.pose);
