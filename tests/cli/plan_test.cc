@@ -18,7 +18,7 @@ using ::testing::Each;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr const char* kHead = "pose,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\n";
+constexpr const char* kPoseHead = "pose,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\n";
 
 // The sample campaign with what `measure` would write of three stations and four markers that face them, at
 // radius 64 mm on the moving grip.
@@ -68,7 +68,7 @@ class Plan : public ::testing::Test {
 };
 
 TEST_F(Plan, PosesThatTheMeasuredStationsDoNotSeeAreLeftOut) {
-  std::string candidates = kHead;
+  std::string candidates = kPoseHead;
   for (int i = 0; i < 8; ++i)
     candidates += fmt::format("seen{},{},{},{},{},{},{}\n", i, 4 * i - 14, 10 - 3 * i, 5 * (i % 3) - 5,
                               3 * (i % 4) - 5, 6 - 2 * i, (7 * i) % 5 - 2);
