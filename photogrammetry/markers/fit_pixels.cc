@@ -146,17 +146,24 @@ FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, 
     }
   };
 
-  // Thinning needs the number of candidates: about the share of the outline's area.
+  // Thinning needs the number of candidates: about the share of the outline's area. Pixels near a transition
+  // tell most of its place, those farther off the levels.
   double area = 0;
   for (std::size_t i = 0; i < 4; ++i) {
     area += 0.5 * (hull[i].x() * hull[(i + 1) % 4].y() - hull[i].y() * hull[(i + 1) % 4].x());
   }
   const double cell_px = 2 * frame.half_side / request.square_cells;
-  const double dense = std::min(1.0, 1.6 * selection.reach_px / std::max(cell_px, 1e-9));
-  const double share = std::min(1.0, selection.max_pixels / std::max(std::abs(area) * dense, 1.0));
+  const auto within = [&](double reach) {
+    return std::abs(area) * std::min(1.0, 1.6 * reach / std::max(cell_px, 1e-9));
+  };
+  const double all = within(selection.reach_px);
+  const double near = std::min(within(selection.near_px), all);
+  const double near_share = selection.max_pixels / std::max(near + (all - near) / 4, 1.0);
+  const double far_share = near_share / 4;
 
   visit([&](int x, int y, const PixelMapPatch::Row& row) {
-    if (share < 1 && pixel_lot(x, y) >= share) return;
+    const double lot = near_share < 4 ? pixel_lot(x, y) : 0;
+    if (lot >= near_share) return;
     const PixelMapPatch::Point ideal = row.at(x);
     FitPixel pixel;
     pixel.point = (ideal.ideal - frame.middle) * px_to_plane;
@@ -169,6 +176,9 @@ FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, 
     const double reach_x = selection.reach_px * by_px.row(0).norm();
     const double reach_y = selection.reach_px * by_px.row(1).norm();
     if (!request.pattern.has_transition(u.x(), u.y(), reach_x, reach_y)) return;
+    const double closer = selection.near_px / selection.reach_px;
+    if (lot >= far_share && !request.pattern.has_transition(u.x(), u.y(), closer * reach_x, closer * reach_y))
+      return;
     const int raw = wide ? grey.at<std::uint16_t>(y, x) : grey.at<std::uint8_t>(y, x);
     if (raw == 0 || raw == (wide ? 65535 : 255)) {
       ++result.clipped;

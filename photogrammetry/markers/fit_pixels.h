@@ -60,6 +60,7 @@ struct PixelSelection {
   InverseHomography homography;
   FitFrame frame;
   double reach_px = 4;  ///< around transitions
+  double near_px = 1;   ///< where thinning takes four times as many
   int max_pixels = 0;   ///< thinned to about so many
 };
 

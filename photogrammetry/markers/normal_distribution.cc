@@ -68,11 +68,11 @@ double plackett_quadrature(double a, double b, double rho) {
 }  // namespace
 
 NormalValue standard_normal(double x) {
-  if (x <= -kReach) return {0, 0};
+  if (!(x > -kReach)) return {0, 0};
   if (x >= kReach) return {1, 0};
   static const NormalValue* const entries = table().data();
-  const double at = std::nearbyint((x + kReach) * kStepsPerUnit);
-  const double x0 = at / kStepsPerUnit - kReach;
+  const int at = static_cast<int>((x + kReach) * kStepsPerUnit + 0.5);
+  const double x0 = at * (1.0 / kStepsPerUnit) - kReach;
   const double h = x - x0;
   const NormalValue& e = entries[static_cast<std::size_t>(at)];
   // Taylor series of third order about the nearest entry.

@@ -5,7 +5,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numeric>
 
 #include "photogrammetry/markers/fit_pixels.h"
@@ -29,6 +28,7 @@ constexpr double kHuber = 3.0;
 constexpr double kNoLimit = 1e9;
 constexpr int kCoarsePixels = 1000;
 constexpr double kFineReachSigmas = 2.8;  // beyond, a pixel says nothing of the edge
+constexpr double kNearSigmas = 1.3;       // within, it says most: 93 % of the edge's place
 constexpr double kLargeSide = 300;        // px; from here on the illumination's curvature counts
 constexpr double kSmallSide = 40;  // px; from here on the blur's anisotropy can be told from the geometry
 
@@ -62,7 +62,10 @@ class MarkerFit {
       parameters_[kWhite] = request_.start->white;
     } else {
       select(3.6 * spread_px() + 1.5, kCoarsePixels);
-      if (!set_levels() || !solve(12, 5e-3)) return fit;
+      list_active();
+      if (!set_levels() || !enough_pixels()) return fit;
+      evaluate_all();
+      if (!solve(12, 5e-3)) return fit;
     }
     const double side_px = 2 * frame_.half_side;
     activate({kBlur + 1, 2}, side_px >= kSmallSide);
@@ -70,12 +73,11 @@ class MarkerFit {
     activate({kShared, 2}, request_.free_tone);
     activate({kShared + 2, 2}, request_.free_lens);
     select(kFineReachSigmas * spread_px() + 0.3, request_.max_pixels);
-    if (request_.pattern.cells() > 2) {
-      list_active();
-      if (!enough_pixels()) return fit;
-      (void)normals(true);
-      drop_covered_cells();
-    }
+    list_active();
+    if (!enough_pixels()) return fit;
+    evaluate_all();
+    if (request_.pattern.cells() > 2) drop_covered_cells();
+    scale_ = robust_scale();
     if (!solve(6, 3e-4)) return fit;
     finish(fit);
     return fit;
@@ -131,7 +133,8 @@ class MarkerFit {
   }
 
   void select(double reach_px, int max_pixels) {
-    const PixelSelection selection{parameters_.segment<8>(kHomography), frame_, reach_px, max_pixels};
+    const PixelSelection selection{parameters_.segment<8>(kHomography), frame_, reach_px,
+                                   kNearSigmas * spread_px(), max_pixels};
     selected_ = select_pixels(grey_, photograph_, *patch_, request_, box_, selection);
     residuals_.assign(selected_.pixels.size(), 0);
     scale_ = kNoLimit;
@@ -144,7 +147,7 @@ class MarkerFit {
     Eigen::Matrix2d n = Eigen::Matrix2d::Zero();
     Eigen::Vector2d rhs = Eigen::Vector2d::Zero();
     for (const FitPixel& pixel : selected_.pixels) {
-      const double share = evaluate(pixel, nullptr, true).value;
+      const double share = sample(pixel).pattern.value;
       const Eigen::Vector2d row(1 - share, share);
       n += row * row.transpose();
       rhs += row * photograph_.tone.decode(pixel.value);
@@ -154,19 +157,20 @@ class MarkerFit {
     return parameters_[kWhite] > parameters_[kBlack];
   }
 
-  struct Value {
-    double value;
+  // White share of the pattern at a pixel, and what leads to its derivatives.
+  struct Sampled {
+    Eigen::Vector2d point;
+    SquarePoint square;
+    Eigen::Matrix2d cells_by_px;
+    PatternSample pattern;
   };
-
-  // The model's encoded value at a pixel (or the white share alone) and, if asked, its derivatives.
-  Value evaluate(const FitPixel& pixel, Vector* row, bool share_only = false) const {
+  Sampled sample(const FitPixel& pixel) const {
     const Vector& p = parameters_;
     Eigen::Vector2d point = pixel.point;
     if (request_.free_lens) {
       point += pixel.by_lens * (p.segment<2>(kShared + 2) - start_.segment<2>(kShared + 2));
     }
-    const InverseHomography g = p.segment<8>(kHomography);
-    const SquarePoint square = square_point(g, point);
+    const SquarePoint square = square_point(InverseHomography(p.segment<8>(kHomography)), point);
     const double half_square = 0.5 * request_.square_cells;
     const double middle = 0.5 * request_.pattern.cells();
     const Eigen::Matrix2d cells_by_px = half_square * square.by_point * pixel.by_px;
@@ -180,10 +184,23 @@ class MarkerFit {
     const Symmetric2 spread{a * a * xx + 2 * a * b * xy + b * b * yy,
                             a * c * xx + (a * d + b * c) * xy + b * d * yy,
                             c * c * xx + 2 * c * d * xy + d * d * yy};
-    const PatternSample s = request_.pattern.sample(half_square * square.t.x() + middle,
-                                                    half_square * square.t.y() + middle, spread);
-    if (share_only) return {s.value};
+    return {point, square, cells_by_px,
+            request_.pattern.sample(half_square * square.t.x() + middle, half_square * square.t.y() + middle,
+                                    spread)};
+  }
 
+  // The model's encoded value at a pixel and its derivatives.
+  double evaluate(const FitPixel& pixel, Vector& r) const {
+    const Vector& p = parameters_;
+    const Sampled sampled = sample(pixel);
+    const Eigen::Vector2d& point = sampled.point;
+    const SquarePoint& square = sampled.square;
+    const PatternSample& s = sampled.pattern;
+    const double half_square = 0.5 * request_.square_cells;
+    const double a = sampled.cells_by_px(0, 0);
+    const double b = sampled.cells_by_px(0, 1);
+    const double c = sampled.cells_by_px(1, 0);
+    const double d = sampled.cells_by_px(1, 1);
     const double ox = pixel.offset.x();
     const double oy = pixel.offset.y();
     const double shade = 1 + p[kLight] * ox + p[kLight + 1] * oy + p[kLight + 2] * ox * ox +
@@ -191,47 +208,44 @@ class MarkerFit {
     const double unshaded = p[kBlack] + (p[kWhite] - p[kBlack]) * s.value;
     const ToneResponse tone(photograph_.tone.nominal(), p[kShared], p[kShared + 1]);
     const ToneResponse::Encoded encoded = tone.encode(unshaded * shade);
-    if (row != nullptr) {
-      Vector& r = *row;
-      const double by_share = encoded.by_light * shade * (p[kWhite] - p[kBlack]);
-      const double tx = by_share * s.by_x * half_square * square.scale;
-      const double ty = by_share * s.by_y * half_square * square.scale;
-      r[0] = tx * point.x();
-      r[1] = tx * point.y();
-      r[2] = tx;
-      r[3] = ty * point.x();
-      r[4] = ty * point.y();
-      r[5] = ty;
-      const double along = tx * square.t.x() + ty * square.t.y();
-      r[6] = -along * point.x();
-      r[7] = -along * point.y();
-      // Heat equation, carried to pixels: half of A^T (second derivatives) A.
-      const Symmetric2& h = s.second;
-      const double hxx = a * a * h.xx + 2 * a * c * h.xy + c * c * h.yy;
-      const double hxy = a * b * h.xx + (a * d + b * c) * h.xy + c * d * h.yy;
-      const double hyy = b * b * h.xx + 2 * b * d * h.xy + d * d * h.yy;
-      r[kBlur] = by_share * 0.5 * (hxx + hyy);
-      r[kBlur + 1] = by_share * 0.5 * (hxx - hyy);
-      r[kBlur + 2] = by_share * hxy;
-      r[kBlack] = encoded.by_light * shade * (1 - s.value);
-      r[kWhite] = encoded.by_light * shade * s.value;
-      const double by_shade = encoded.by_light * unshaded;
-      r[kLight] = by_shade * ox;
-      r[kLight + 1] = by_shade * oy;
-      r[kLight + 2] = by_shade * ox * ox;
-      r[kLight + 3] = by_shade * ox * oy;
-      r[kLight + 4] = by_shade * oy * oy;
-      r[kShared] = encoded.by_first;
-      r[kShared + 1] = encoded.by_second;
-      if (request_.free_lens) {
-        const Eigen::RowVector2d by_point =
-            by_share * half_square * Eigen::RowVector2d(s.by_x, s.by_y) * square.by_point;
-        r.segment<2>(kShared + 2) = (by_point * pixel.by_lens).transpose();
-      } else {
-        r.segment<2>(kShared + 2).setZero();
-      }
+    const double by_share = encoded.by_light * shade * (p[kWhite] - p[kBlack]);
+    const double tx = by_share * s.by_x * half_square * square.scale;
+    const double ty = by_share * s.by_y * half_square * square.scale;
+    r[0] = tx * point.x();
+    r[1] = tx * point.y();
+    r[2] = tx;
+    r[3] = ty * point.x();
+    r[4] = ty * point.y();
+    r[5] = ty;
+    const double along = tx * square.t.x() + ty * square.t.y();
+    r[6] = -along * point.x();
+    r[7] = -along * point.y();
+    // Heat equation, carried to pixels: half of A^T (second derivatives) A.
+    const Symmetric2& h = s.second;
+    const double hxx = a * a * h.xx + 2 * a * c * h.xy + c * c * h.yy;
+    const double hxy = a * b * h.xx + (a * d + b * c) * h.xy + c * d * h.yy;
+    const double hyy = b * b * h.xx + 2 * b * d * h.xy + d * d * h.yy;
+    r[kBlur] = by_share * 0.5 * (hxx + hyy);
+    r[kBlur + 1] = by_share * 0.5 * (hxx - hyy);
+    r[kBlur + 2] = by_share * hxy;
+    r[kBlack] = encoded.by_light * shade * (1 - s.value);
+    r[kWhite] = encoded.by_light * shade * s.value;
+    const double by_shade = encoded.by_light * unshaded;
+    r[kLight] = by_shade * ox;
+    r[kLight + 1] = by_shade * oy;
+    r[kLight + 2] = by_shade * ox * ox;
+    r[kLight + 3] = by_shade * ox * oy;
+    r[kLight + 4] = by_shade * oy * oy;
+    r[kShared] = encoded.by_first;
+    r[kShared + 1] = encoded.by_second;
+    if (request_.free_lens) {
+      const Eigen::RowVector2d by_point =
+          by_share * half_square * Eigen::RowVector2d(s.by_x, s.by_y) * square.by_point;
+      r.segment<2>(kShared + 2) = (by_point * pixel.by_lens).transpose();
+    } else {
+      r.segment<2>(kShared + 2).setZero();
     }
-    return {encoded.value};
+    return encoded.value;
   }
 
   // Whitened residuals' median as a standard deviation, not below 1.
@@ -274,28 +288,64 @@ class MarkerFit {
     Vector rhs;
   };
 
-  // Normal equations of the active parameters, compressed to the first `active_list_.size()` rows. Leaves the
-  // whitened residuals of all pixels in residuals_.
-  Normals normals(bool with_priors) {
-    Normals result{Matrix::Zero(), Vector::Zero()};
+  // Whitened residuals and rows of the active parameters' derivatives of all pixels.
+  void evaluate_all() {
     const std::size_t count = active_list_.size();
+    rows_.resize(selected_.pixels.size() * count);
     Vector row;
-    std::array<double, kCount> j{};
     for (std::size_t at = 0; at < selected_.pixels.size(); ++at) {
       const FitPixel& pixel = selected_.pixels[at];
-      const double residual = (pixel.value - evaluate(pixel, &row).value) * pixel.weight;
-      residuals_[at] = residual;
-      if (!pixel.kept) continue;
-      const double size = std::abs(residual) / scale_;
-      const double root = size <= kHuber ? 1 : std::sqrt(kHuber / size);
-      const double weight = root * pixel.weight;
-      for (std::size_t k = 0; k < count; ++k) j[k] = row[active_list_[k]] * weight;
+      residuals_[at] = (pixel.value - evaluate(pixel, row)) * pixel.weight;
+      double* const j = rows_.data() + at * count;
+      for (std::size_t k = 0; k < count; ++k) j[k] = row[active_list_[k]] * pixel.weight;
+    }
+  }
+
+  double robust_weight(std::size_t pixel) const {
+    const double size = std::abs(residuals_[pixel]) / scale_;
+    return size <= kHuber ? 1 : kHuber / size;
+  }
+
+  // Normal equations of the active parameters, compressed to the first `active_list_.size()` rows, from the
+  // last evaluation.
+  Normals normals(bool with_priors) const {
+    Normals result{Matrix::Zero(), Vector::Zero()};
+    const std::size_t count = active_list_.size();
+    // Four pixels at a time: the sums are loaded and stored once for them.
+    constexpr std::size_t kTogether = 4;
+    static constexpr std::array<double, kCount> kNone{};
+    std::array<const double*, kTogether> j{};
+    std::array<double, kTogether> weight{};
+    std::array<double, kTogether> residual{};
+    std::size_t waiting = 0;
+    const auto add = [&] {
       for (std::size_t k = 0; k < count; ++k) {
         double* const column = result.n.data() + k * kCount;
-        const double factor = j[k];
-        for (std::size_t i = 0; i <= k; ++i) column[i] += factor * j[i];
-        result.rhs[static_cast<int>(k)] += factor * root * residual;
+        const double f0 = weight[0] * j[0][k];
+        const double f1 = weight[1] * j[1][k];
+        const double f2 = weight[2] * j[2][k];
+        const double f3 = weight[3] * j[3][k];
+        for (std::size_t i = 0; i <= k; ++i) {
+          column[i] += f0 * j[0][i] + f1 * j[1][i] + f2 * j[2][i] + f3 * j[3][i];
+        }
+        result.rhs[static_cast<int>(k)] +=
+            f0 * residual[0] + f1 * residual[1] + f2 * residual[2] + f3 * residual[3];
       }
+      waiting = 0;
+    };
+    for (std::size_t at = 0; at < selected_.pixels.size(); ++at) {
+      if (!selected_.pixels[at].kept) continue;
+      j[waiting] = rows_.data() + at * count;
+      weight[waiting] = robust_weight(at);
+      residual[waiting] = residuals_[at];
+      if (++waiting == kTogether) add();
+    }
+    if (waiting > 0) {
+      for (; waiting < kTogether; ++waiting) {
+        j[waiting] = kNone.data();
+        weight[waiting] = residual[waiting] = 0;
+      }
+      add();
     }
     if (with_priors) add_priors(result);
     for (std::size_t k = 0; k < count; ++k) {
@@ -346,12 +396,11 @@ class MarkerFit {
 
   bool enough_pixels() const { return selected_.pixels.size() >= 2 * active_list_.size(); }
 
-  // Levenberg-Marquardt until the square moves less than `tolerance_px`. Robust weights from the second step
-  // on.
+  // Levenberg-Marquardt from the last evaluation until the square moves less than `tolerance_px`; leaves
+  // everything evaluated at its end. Weights are robust from the second step on, or from the first if the
+  // scale is known.
   bool solve(int max_iterations, double tolerance_px) {
-    list_active();
     const auto count = static_cast<Eigen::Index>(active_list_.size());
-    if (!enough_pixels()) return false;
     double damping = 1e-6;
     Normals at = normals(true);
     for (int iteration = 0; iteration < max_iterations; ++iteration) {
@@ -363,14 +412,15 @@ class MarkerFit {
       const Eigen::VectorXd step = n.ldlt().solve(at.rhs.head(count));
       if (!step.allFinite()) return false;
       apply(step);
+      evaluate_all();
       const double moved = step.head(request_.affine ? 6 : 8).cwiseAbs().maxCoeff() * frame_.half_side;
       if (moved < tolerance_px) break;
-      Normals next = normals(true);
       if (robust_cost() <= cost * (1 + 1e-9)) {
         damping = std::max(damping * 0.1, 1e-9);
-        at = next;
+        at = normals(true);
       } else {
         parameters_ = before;
+        evaluate_all();
         damping = std::max(damping * 30, 1e-4);
         if (damping > 1e6) break;
       }
@@ -389,16 +439,17 @@ class MarkerFit {
     constexpr double kMaxTerm = 100;
     constexpr double kMaxMean = 12;
     constexpr int kMinPixels = 6;
-    std::map<int, Cell> cells;
+    const auto side = static_cast<std::size_t>(request_.pattern.cells() + 2);
+    std::vector<Cell> cells(side * side);
     const double scale = robust_scale();
     for (std::size_t i = 0; i < residuals_.size(); ++i) {
       const double r = residuals_[i] / scale;
-      Cell& cell = cells[selected_.pixels[i].cell];
+      Cell& cell = cells[static_cast<std::size_t>(selected_.pixels[i].cell)];
       cell.sum += std::min(r * r, kMaxTerm);
       ++cell.count;
     }
     for (FitPixel& pixel : selected_.pixels) {
-      const Cell& cell = cells[pixel.cell];
+      const Cell& cell = cells[static_cast<std::size_t>(pixel.cell)];
       pixel.kept = cell.count < kMinPixels || cell.sum < kMaxMean * cell.count;
     }
   }
@@ -427,24 +478,30 @@ class MarkerFit {
   // Fit quality, and the score's covariance summed by blocks (White 1980, clustered): residuals of
   // neighbouring pixels are not independent after JPEG or where the model misfits.
   void measure_residuals(PhotometricFit& fit, const Eigen::MatrixXd& covariance, int geometry) const {
-    std::map<int, Vector> scores;
+    struct Score {
+      int pixels = 0;
+      Vector sum = Vector::Zero();
+    };
+    int last_block = 0;
+    for (const FitPixel& pixel : selected_.pixels) last_block = std::max(last_block, pixel.block);
+    std::vector<Score> scores(static_cast<std::size_t>(last_block) + 1);
+    const std::size_t size = active_list_.size();
     double sum = 0;
     double used = 0;
     int agreeing = 0;
-    Vector row;
     for (std::size_t i = 0; i < residuals_.size(); ++i) {
       const FitPixel& pixel = selected_.pixels[i];
       const double residual = residuals_[i];
       if (pixel.kept && std::abs(residual) < 5 * scale_) ++agreeing;
       if (!pixel.kept) continue;
-      const double size = std::abs(residual) / scale_;
-      const double robust = size <= kHuber ? 1 : kHuber / size;
-      (void)evaluate(pixel, &row);
+      const double robust = robust_weight(i);
       sum += robust * residual * residual;
       used += 1;
-      auto [entry, is_new] = scores.try_emplace(pixel.block, Vector::Zero());
-      for (std::size_t k = 0; k < active_list_.size(); ++k) {
-        entry->second[static_cast<int>(k)] += row[active_list_[k]] * pixel.weight * residual * robust;
+      Score& score = scores[static_cast<std::size_t>(pixel.block)];
+      ++score.pixels;
+      const double* const row = rows_.data() + i * size;
+      for (std::size_t k = 0; k < size; ++k) {
+        score.sum[static_cast<int>(k)] += row[k] * residual * robust;
       }
     }
     const double free = std::max(used - static_cast<double>(active_list_.size()), 1.0);
@@ -458,11 +515,13 @@ class MarkerFit {
     const Eigen::MatrixXd geometry_rows = covariance.topRows(geometry);
     const Eigen::MatrixXd information = covariance.topLeftCorner(geometry, geometry).inverse();
     double clustered = 0;
-    for (const auto& [block, score] : scores) {
-      const Eigen::VectorXd shift = geometry_rows * score.head(count);
+    double blocks = 0;
+    for (const Score& score : scores) {
+      if (score.pixels == 0) continue;
+      const Eigen::VectorXd shift = geometry_rows * score.sum.head(count);
       clustered += shift.dot(information * shift);
+      blocks += 1;
     }
-    const auto blocks = static_cast<double>(scores.size());
     const double unbiased = blocks > geometry + 1 ? blocks / (blocks - geometry) : 1;
     fit.covariance_factor = std::max(clustered / geometry * unbiased, 1e-12);
   }
@@ -542,6 +601,7 @@ class MarkerFit {
   std::array<bool, kCount> active_{};
   std::vector<int> active_list_;
   std::vector<double> residuals_;  // whitened
+  std::vector<double> rows_;       // whitened derivatives by the active parameters, pixel by pixel
   double scale_ = kNoLimit;        // of the residuals, for the robust weights
 };
 

@@ -16,10 +16,6 @@ MarkerObservation observation(int id, const std::array<Eigen::Vector2d, 4>& corn
   return marker;
 }
 
-std::vector<MarkerObservation> hexcal_markers(const cv::Mat& grey, const MarkerFamily& family) {
-  return detect_markers(grey, ToneCurve::srgb, family);
-}
-
 std::vector<MarkerObservation> april_tags(const cv::Mat& grey, float decimate) {
   apriltag_family_t* family = tag36h11_create();
   apriltag_detector_t* detector = apriltag_detector_create();
@@ -50,14 +46,20 @@ std::vector<MarkerObservation> aruco_markers(const cv::Mat& grey, cv::aruco::Cor
   const auto dictionary = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_APRILTAG_36h11);
   const auto parameters = cv::aruco::DetectorParameters::create();
   parameters->cornerRefinementMethod = method;
+  // Its defaults are for photographs of a megapixel: wider thresholding windows, and the patterns as they
+  // are.
+  parameters->adaptiveThreshWinSizeMax = 103;
+  parameters->adaptiveThreshWinSizeStep = 40;
+  parameters->minMarkerPerimeterRate = 0.01;
   std::vector<std::vector<cv::Point2f>> found;
   std::vector<int> ids;
   cv::aruco::detectMarkers(grey, dictionary, found, ids, parameters);
   std::vector<MarkerObservation> markers;
   for (std::size_t i = 0; i < ids.size(); ++i) {
+    // Its AprilTag patterns are those of the library turned by half a turn.
     std::array<Eigen::Vector2d, 4> corners;
     for (std::size_t k = 0; k < 4; ++k)
-      corners[k] = Eigen::Vector2d(found[i][k].x - shift, found[i][k].y - shift);
+      corners[(k + 2) % 4] = Eigen::Vector2d(found[i][k].x - shift, found[i][k].y - shift);
     markers.push_back(observation(ids[i], corners));
   }
   return markers;
@@ -66,22 +68,34 @@ std::vector<MarkerObservation> aruco_markers(const cv::Mat& grey, cv::aruco::Cor
 }  // namespace
 
 const std::vector<Detector>& detectors() {
+  using Family = MarkerFamily;
   static const std::vector<Detector> all{
-      {"hexcal", hexcal_markers},
-      {"apriltag 1", [](const cv::Mat& g, const MarkerFamily&) { return april_tags(g, 1); }},
-      {"apriltag 2", [](const cv::Mat& g, const MarkerFamily&) { return april_tags(g, 2); }},
-      {"aruco none", [](const cv::Mat& g,
-                        const MarkerFamily&) { return aruco_markers(g, cv::aruco::CORNER_REFINE_NONE, 0); }},
-      {"aruco subpix",
-       [](const cv::Mat& g, const MarkerFamily&) {
+      {"hexcal", true,
+       [](const cv::Mat& g, const Family& family, const CameraModel*) {
+         return detect_markers(g, ToneCurve::srgb, family);
+       }},
+      {"hexcal, lens", true,
+       [](const cv::Mat& g, const Family& family, const CameraModel* camera) {
+         return detect_markers(g, ToneCurve::srgb, family, {}, camera);
+       }},
+      {"apriltag 1", false,
+       [](const cv::Mat& g, const Family&, const CameraModel*) { return april_tags(g, 1); }},
+      {"apriltag 2", false,
+       [](const cv::Mat& g, const Family&, const CameraModel*) { return april_tags(g, 2); }},
+      {"aruco none", false,
+       [](const cv::Mat& g, const Family&, const CameraModel*) {
+         return aruco_markers(g, cv::aruco::CORNER_REFINE_NONE, 0);
+       }},
+      {"aruco subpix", false,
+       [](const cv::Mat& g, const Family&, const CameraModel*) {
          return aruco_markers(g, cv::aruco::CORNER_REFINE_SUBPIX, 0);
        }},
-      {"aruco contour",
-       [](const cv::Mat& g, const MarkerFamily&) {
+      {"aruco contour", false,
+       [](const cv::Mat& g, const Family&, const CameraModel*) {
          return aruco_markers(g, cv::aruco::CORNER_REFINE_CONTOUR, 0);
        }},
       // Its corners lie half a pixel towards the bottom right in OpenCV 4.6.
-      {"aruco apriltag", [](const cv::Mat& g, const MarkerFamily&) {
+      {"aruco apriltag", false, [](const cv::Mat& g, const Family&, const CameraModel*) {
          return aruco_markers(g, cv::aruco::CORNER_REFINE_APRILTAG, 0.5);
        }}};
   return all;

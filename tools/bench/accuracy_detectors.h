@@ -12,12 +12,15 @@ namespace hexcal {
 /// A way to find markers in a decoded photograph. Corners come back in this project's order and pixels.
 struct Detector {
   std::string name;
-  std::vector<MarkerObservation> (*detect)(const cv::Mat& grey, const MarkerFamily& family);
+  bool has_covariance = false;
+  /// `camera`: only the one that knows the lens uses it.
+  std::vector<MarkerObservation> (*detect)(const cv::Mat& grey, const MarkerFamily& family,
+                                           const CameraModel* camera);
 };
 
-/// This project's (without a camera), libapriltag at full and half resolution with its own refinement, and
-/// OpenCV's aruco with each of its refinements; the libraries' half pixels are taken off. The others know
-/// tag36h11 only.
+/// This project's without and with the lens known, libapriltag at full and half resolution with its own
+/// refinement, and OpenCV's aruco with each of its refinements; the libraries' half pixels are taken off. The
+/// others know tag36h11 only.
 [[nodiscard]] const std::vector<Detector>& detectors();
 
 }  // namespace hexcal
