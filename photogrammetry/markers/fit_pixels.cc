@@ -9,15 +9,15 @@
 namespace hexcal {
 namespace {
 
-// A pseudo-random number in [0, 1) of a pixel: thinning must not alias with the pattern.
-double pixel_lot(int x, int y) {
+// A pseudo-random number of a pixel: thinning must not alias with the pattern.
+std::uint32_t pixel_lot(int x, int y) {
   std::uint32_t h = static_cast<std::uint32_t>(x) * 0x9E3779B1U ^ static_cast<std::uint32_t>(y) * 0x85EBCA77U;
   h ^= h >> 15;
   h *= 0x2C1B3C6DU;
   h ^= h >> 12;
   h *= 0x297A2D39U;
   h ^= h >> 15;
-  return h * 0x1p-32;
+  return h;
 }
 
 // Pixels of the row y that can be near the square grown by `margin` (in half sides of the square).
@@ -110,39 +110,33 @@ FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, 
   }
 
   // Most of a large marker is far from any transition: whole tiles of 8 x 8 pixels are passed over when the
-  // pattern does not change within the reach of any of their pixels.
+  // pattern does not change within the reach of any of their pixels. Within a tile the map to cells is taken
+  // as linear when the single pixels are looked at.
   constexpr int kTile = 8;
   constexpr double kTileReach = 1.1 * kTile;  // half its diagonal, 5.7 px, and perspective within it
-  const int tiles_across = box.width / kTile + 1;
-  std::vector<char> wanted(static_cast<std::size_t>(tiles_across));
+  struct Tile {
+    bool wanted = false;
+    Eigen::Vector2d cells;  // of its middle
+    Eigen::Matrix2d by_px;
+    Eigen::Vector2d reach;  // of one pixel, in cells
+  };
+  constexpr double kMiddle = 0.5 * (kTile - 1);
+  std::vector<Tile> tiles(static_cast<std::size_t>(box.width / kTile + 1));
   const auto look_at_tiles = [&](int top) {
-    const PixelMapPatch::Row row = patch.row(top + 0.5 * (kTile - 1));
-    for (int tile = 0; tile < tiles_across; ++tile) {
-      const PixelMapPatch::Point ideal = row.at(box.x + (tile + 0.5) * kTile - 0.5);
+    const PixelMapPatch::Row row = patch.row(top + kMiddle);
+    int left = box.x;
+    for (Tile& tile : tiles) {
+      const PixelMapPatch::Point ideal = row.at(left + kMiddle);
+      left += kTile;
       const SquarePoint square =
           square_point(selection.homography, (ideal.ideal - frame.middle) * px_to_plane);
-      const Eigen::Matrix2d by_px = square.by_point * ideal.by_px * (px_to_plane * half_square);
-      const Eigen::Vector2d u = square.t * half_square + Eigen::Vector2d::Constant(half_pattern);
+      tile.by_px = square.by_point * ideal.by_px * (px_to_plane * half_square);
+      tile.cells = square.t * half_square + Eigen::Vector2d::Constant(half_pattern);
+      tile.reach = tile.by_px.rowwise().norm();
       const double reach = selection.reach_px + kTileReach;
-      wanted[static_cast<std::size_t>(tile)] =
-          !(square.scale > 0) || request.pattern.has_transition(u.x(), u.y(), reach * by_px.row(0).norm(),
-                                                                reach * by_px.row(1).norm());
-    }
-  };
-  const auto visit = [&](auto&& use) {
-    for (int y = box.y; y < box.y + box.height; ++y) {
-      if ((y - box.y) % kTile == 0) look_at_tiles(y);
-      const Span span = span_in_row(hull, y, box);
-      if (span.first > span.last) continue;
-      const PixelMapPatch::Row row = patch.row(y);
-      for (int x = span.first; x <= span.last; ++x) {
-        const int tile = (x - box.x) / kTile;
-        if (wanted[static_cast<std::size_t>(tile)] == 0) {
-          x = box.x + (tile + 1) * kTile - 1;
-          continue;
-        }
-        use(x, y, row);
-      }
+      tile.wanted =
+          square.scale > 0 && request.pattern.has_transition(tile.cells.x(), tile.cells.y(),
+                                                             reach * tile.reach.x(), reach * tile.reach.y());
     }
   };
 
@@ -158,12 +152,19 @@ FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, 
   };
   const double all = within(selection.reach_px);
   const double near = std::min(within(selection.near_px), all);
-  const double near_share = selection.max_pixels / std::max(near + (all - near) / 4, 1.0);
-  const double far_share = near_share / 4;
+  const double share = selection.max_pixels / std::max(near + (all - near) / 4, 1.0);
+  const auto most_of = [](double taken) { return static_cast<std::uint64_t>(0x1p32 * std::min(taken, 1.0)); };
+  const std::uint64_t near_lots = most_of(share);
+  const std::uint64_t far_lots = most_of(share / 4);
 
-  visit([&](int x, int y, const PixelMapPatch::Row& row) {
-    const double lot = near_share < 4 ? pixel_lot(x, y) : 0;
-    if (lot >= near_share) return;
+  const auto take = [&](int x, int y, const Tile& tile, const Eigen::Vector2d& from_middle,
+                        const PixelMapPatch::Row& row) {
+    const std::uint32_t lot = pixel_lot(x, y);
+    if (lot >= near_lots) return;
+    const Eigen::Vector2d about = tile.cells + tile.by_px * from_middle;
+    const double reach = lot < far_lots ? selection.reach_px : selection.near_px;
+    if (!request.pattern.has_transition(about.x(), about.y(), reach * tile.reach.x(), reach * tile.reach.y()))
+      return;
     const PixelMapPatch::Point ideal = row.at(x);
     FitPixel pixel;
     pixel.point = (ideal.ideal - frame.middle) * px_to_plane;
@@ -171,14 +172,7 @@ FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, 
     const SquarePoint square = square_point(selection.homography, pixel.point);
     if (!(square.scale > 0)) return;
     const Eigen::Vector2d u = square.t * half_square + Eigen::Vector2d::Constant(half_pattern);
-    const Eigen::Matrix2d by_px = square.by_point * pixel.by_px * half_square;
     if ((u.array() - half_pattern).abs().maxCoeff() > request.window_cells) return;
-    const double reach_x = selection.reach_px * by_px.row(0).norm();
-    const double reach_y = selection.reach_px * by_px.row(1).norm();
-    if (!request.pattern.has_transition(u.x(), u.y(), reach_x, reach_y)) return;
-    const double closer = selection.near_px / selection.reach_px;
-    if (lot >= far_share && !request.pattern.has_transition(u.x(), u.y(), closer * reach_x, closer * reach_y))
-      return;
     const int raw = wide ? grey.at<std::uint16_t>(y, x) : grey.at<std::uint8_t>(y, x);
     if (raw == 0 || raw == (wide ? 65535 : 255)) {
       ++result.clipped;
@@ -198,7 +192,25 @@ FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, 
     pixel.cell = cell_of(u.y()) * (cells + 2) + cell_of(u.x());
     pixel.block = ((y >> 3) - (box.y >> 3)) * ((box.width >> 3) + 2) + ((x >> 3) - (box.x >> 3));
     result.pixels.push_back(pixel);
-  });
+  };
+
+  for (int y = box.y; y < box.y + box.height; ++y) {
+    const int in_tile_y = (y - box.y) % kTile;
+    if (in_tile_y == 0) look_at_tiles(y);
+    const Span span = span_in_row(hull, y, box);
+    if (span.first > span.last) continue;
+    const PixelMapPatch::Row row = patch.row(y);
+    for (int x = span.first; x <= span.last; ++x) {
+      const int at = (x - box.x) / kTile;
+      const Tile& tile = tiles[static_cast<std::size_t>(at)];
+      const int left = box.x + at * kTile;
+      if (tile.wanted) {
+        take(x, y, tile, {x - left - kMiddle, in_tile_y - kMiddle}, row);
+      } else {
+        x = left + kTile - 1;
+      }
+    }
+  }
   return result;
 }
 

@@ -37,7 +37,7 @@ struct FitRequest {
   double lens_sigma = 0.3;  ///< of the lens stand-in's parameters as they are
   /// Half the side of the window of a saddle point in cells; infinite for markers.
   double window_cells = 1e9;
-  int max_pixels = 8000;  ///< more are thinned
+  int max_pixels = 6000;  ///< more are thinned
   /// From an earlier fit whose corners these are: the coarse stage is left out.
   std::optional<FitStart> start = std::nullopt;
 };

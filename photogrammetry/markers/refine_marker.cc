@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kNoiseMarginPx = 24;
 constexpr double kLensSigma = 0.01;       // of a real lens about the stand-in all markers agree on
-constexpr int kPixelsOfFirstLook = 3000;  // when the photograph's own parameters are still to be told
+constexpr int kPixelsOfFirstLook = 2000;  // when the photograph's own parameters are still to be told
 
 cv::Rect box_around(const std::array<Eigen::Vector2d, 4>& corners, double margin) {
   Eigen::Vector2d low = corners[0];
