@@ -77,34 +77,37 @@ NoiseModel estimate_noise(const cv::Mat& grey, const cv::Rect& region) {
       by_level[static_cast<std::size_t>(level + 0.5)].push_back(window.variance / (scale * scale));
     }
   }
-  NoiseModel model;
+  std::array<double, NoiseModel::kLevels> found{};
   double quietest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < by_level.size(); ++i) {
     auto& variances = by_level[i];
-    model.at_level_[i] = -1;
     if (variances.size() < kMinWindows) continue;
     const auto nth =
         variances.begin() + static_cast<std::ptrdiff_t>(kQuantile * static_cast<double>(variances.size()));
     std::nth_element(variances.begin(), nth, variances.end());
-    model.at_level_[i] = std::max(*nth / kQuantileOfUnitVariance, rounding);
-    quietest = std::min(quietest, model.at_level_[i]);
+    found[i] = std::max(*nth / kQuantileOfUnitVariance, rounding);
+    quietest = std::min(quietest, found[i]);
   }
-  if (!std::isfinite(quietest)) quietest = std::max(1.0 / (255.0 * 255.0), rounding);
-  for (double& v : model.at_level_) v = std::min(v, kMaxRatio * quietest);
-  // Levels that do not occur take the nearest that does.
-  for (std::size_t i = 0; i < by_level.size(); ++i) {
-    if (model.at_level_[i] > 0) continue;
-    double nearest = quietest;
-    for (std::size_t distance = 1; distance < by_level.size(); ++distance) {
-      const bool below = i >= distance && !by_level[i - distance].empty() &&
-                         model.at_level_[i - distance] > 0 && by_level[i - distance].size() >= kMinWindows;
-      const bool above = i + distance < by_level.size() && by_level[i + distance].size() >= kMinWindows;
-      if (below || above) {
-        nearest = model.at_level_[below ? i - distance : i + distance];
-        break;
-      }
-    }
-    model.at_level_[i] = nearest;
+  NoiseModel model;
+  if (!std::isfinite(quietest)) {
+    model.at_level_.fill(std::max(1.0 / (255.0 * 255.0), rounding));
+    return model;
+  }
+  // A level of which only edges and texture are seen tells nothing. Linear between the others, constant
+  // beyond them.
+  for (double& variance : found) {
+    if (variance > kMaxRatio * quietest) variance = 0;
+  }
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    std::size_t below = i;
+    while (below > 0 && found[below] == 0) --below;
+    std::size_t above = i;
+    while (above + 1 < found.size() && found[above] == 0) ++above;
+    if (found[below] == 0) below = above;
+    if (found[above] == 0) above = below;
+    const double share =
+        above > below ? static_cast<double>(i - below) / static_cast<double>(above - below) : 0;
+    model.at_level_[i] = found[below] + share * (found[above] - found[below]);
   }
   return model;
 }

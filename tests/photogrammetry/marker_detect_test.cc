@@ -1,6 +1,9 @@
 #include <gmock/gmock.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <map>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
@@ -12,6 +15,7 @@ namespace hexcal {
 namespace {
 
 using testing::flat_marker;
+using testing::FlatPattern;
 using testing::render_image;
 using testing::square_corners;
 using testing::TestImage;
@@ -100,9 +104,90 @@ TEST(DetectMarkers, ToSteepIsNamed) {
   EXPECT_EQ(status_of(one_marker(usual().patterns[5], 300, 0.4, 72 * kRadPerDeg).grey), MarkerStatus::ok);
 }
 
-TEST(DetectMarkers, SmallFromFourteenPixels) {
-  const Scene scene = one_marker(usual().patterns[5], 14, 0.2, 0);
-  EXPECT_EQ(status_of(scene.grey), MarkerStatus::ok);
+// How many of 20 markers of so many pixels a side are read; none may be read as another, and what is trusted
+// must be where its covariance says.
+int read_of_twenty(const char* family_name, double side_px) {
+  const MarkerFamily& family = marker_family(family_name);
+  int read = 0;
+  for (int i = 0; i < 20; ++i) {
+    const int id = 2 * i;
+    const Scene scene = one_marker(family.patterns[static_cast<std::size_t>(id)], side_px, 0.31 * i, 0,
+                                   {0.13 * (i % 7), 0.17 * (i % 5)});
+    for (const auto& marker : detect_markers(scene.grey, ToneCurve::srgb, family)) {
+      EXPECT_EQ(marker.id, id) << family_name;
+      if (marker.status != MarkerStatus::ok) continue;
+      ++read;
+      const double sigma = std::sqrt(marker.covariance_px2.diagonal().maxCoeff());
+      EXPECT_LT(largest_error(marker, scene.corners), 5 * sigma) << family_name << " id " << id;
+    }
+  }
+  return read;
+}
+
+TEST(DetectMarkers, TwelvePixelsASideAreReadWhereACellHasTwoPixels) {
+  EXPECT_EQ(read_of_twenty("DICT_4X4_50", 12.3), 20);
+  EXPECT_GE(read_of_twenty("tag36h11", 12.3), 15);  // cells of 1.5 px
+  EXPECT_EQ(read_of_twenty("tag36h11", 16), 20);
+}
+
+TEST(DetectMarkers, TwoThousandPixelsASide) {
+  TestImage image;
+  image.width_px = image.height_px = 2700;
+  image.oversampling = 2;
+  image.noise = 1.5;
+  const Eigen::Matrix3d square = tilted_square({1350.3, 1349.6}, 2000, 0.2, 0.3, 0.4);
+  const cv::Mat grey = render_image(image, {flat_marker(usual().patterns[5], square)});
+  const auto markers = detect_markers(grey, ToneCurve::srgb, usual());
+  ASSERT_EQ(markers.size(), 1U);
+  EXPECT_EQ(markers[0].id, 5);
+  EXPECT_EQ(markers[0].status, MarkerStatus::ok) << marker_status_name(markers[0].status);
+  EXPECT_LT(largest_error(markers[0], square_corners(square)), 0.05);
+}
+
+// Four photographs of 12 markers at all angles with a camera: 384 coordinates tell a variance of 1 to 7 %.
+// (Where cells are smaller than the 8 pixels that the noise is told from, sigmas come out up to 20 % too
+// large.)
+TEST(DetectMarkers, CovariancesAreHonest) {
+  CameraModel camera(720, 540, 900);
+  const Eigen::Matrix3d normalised_from_px =
+      (Eigen::Matrix3d() << 900, 0, camera.parameters[2], 0, 900, camera.parameters[3], 0, 0, 1)
+          .finished()
+          .inverse();
+  double sum = 0;
+  int markers = 0;
+  for (int photograph = 0; photograph < 4; ++photograph) {
+    TestImage image;
+    image.width_px = 720;
+    image.height_px = 540;
+    image.blur_px = 0.5 + 0.2 * photograph;
+    image.oversampling = 4;
+    image.camera = &camera;
+    image.seed = static_cast<std::uint64_t>(100 + photograph);
+    std::vector<FlatPattern> patterns;
+    std::map<int, std::array<Eigen::Vector2d, 4>> truth;
+    for (int i = 0; i < 12; ++i) {
+      const int id = 12 * photograph + i;
+      const Eigen::Matrix3d square = tilted_square(
+          {95 + 176 * (i % 4) + 0.13 * i, 95 + 175 * (i / 4) - 0.11 * i}, 100, 0.37 * id, 0.08 * i, 0.9 * id);
+      patterns.push_back(
+          flat_marker(usual().patterns[static_cast<std::size_t>(id)], normalised_from_px * square));
+      truth[id] = square_corners(square);
+    }
+    const cv::Mat grey = render_image(image, patterns);
+    for (const auto& marker : detect_markers(grey, ToneCurve::srgb, usual(), {}, &camera)) {
+      ASSERT_EQ(marker.status, MarkerStatus::ok) << marker.id << " " << marker_status_name(marker.status);
+      Eigen::Matrix<double, 8, 1> error;
+      for (int c = 0; c < 4; ++c) {
+        const auto corner = static_cast<std::size_t>(c);
+        error.segment<2>(2 * c) = marker.corners_px[corner] - truth.at(marker.id)[corner];
+      }
+      sum += error.dot(marker.covariance_px2.ldlt().solve(error));
+      ++markers;
+    }
+  }
+  EXPECT_EQ(markers, 48);
+  EXPECT_GT(sum / (8 * markers), 0.8);
+  EXPECT_LT(sum / (8 * markers), 1.3);
 }
 
 TEST(DetectMarkers, TheSameIdTwiceIsTrustedInNeitherPlace) {
