@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <queue>
 #include <random>
 
 #include "calibration/free_parameters.h"
@@ -234,22 +235,28 @@ PosePlan plan_poses(const PlatformGeometry& nominal, const std::vector<Pose>& ca
 
   PosePlan plan;
   Eigen::MatrixXd covariance = covariance_of(measured, {}, design.parameters());
-  const auto best_addition = [&](const std::vector<std::size_t>& taken) {
-    const Eigen::MatrixXd weighted = criterion.weighted(covariance);
-    std::size_t best = 0;
-    double most = -std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < measured.size(); ++i) {
-      if (std::find(taken.begin(), taken.end(), i) != taken.end()) continue;
-      const double gain = criterion.gain(covariance, weighted, measured[i], 1.0);
-      if (gain > most) {
-        most = gain;
-        best = i;
-      }
+  // Greedy, and lazily so (Minoux 1978): what a pose adds only shrinks as others come, so that those whose
+  // gain was small before need not be looked at again.
+  struct Candidate {
+    double gain;
+    std::size_t index, chosen_then;
+    bool operator<(const Candidate& other) const {
+      return gain < other.gain || (gain == other.gain && index > other.index);
     }
-    return std::pair(best, most);
   };
+  std::priority_queue<Candidate> queue;
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    queue.push({std::numeric_limits<double>::infinity(), i, options.count});
+  }
   while (plan.chosen.size() < options.count) {
-    plan.chosen.push_back(best_addition(plan.chosen).first);
+    const Eigen::MatrixXd weighted = criterion.weighted(covariance);
+    while (queue.top().chosen_then != plan.chosen.size()) {
+      const std::size_t i = queue.top().index;
+      queue.pop();
+      queue.push({criterion.gain(covariance, weighted, measured[i], 1.0), i, plan.chosen.size()});
+    }
+    plan.chosen.push_back(queue.top().index);
+    queue.pop();
     covariance = covariance_of(measured, plan.chosen, design.parameters());
   }
   exchange(plan, measured, criterion, options.max_exchanges, design.parameters());
