@@ -118,8 +118,12 @@ void analyse(const Job& job, Stage& stage) {
   stage.redundancy = rows - unknowns + prior_information(job, stage);
 }
 
+// While outliers are sought, a tenth of a standard deviation is near enough.
+constexpr double kRoughlyConverged = 0.01;
+
 // Graduated robust adjustment: the limit follows the median of the sightings' squares until both settle.
 double solve_robustly(const Job& job, Stage& stage) {
+  stage.settings.converged = kRoughlyConverged;
   double limit2 = 0;
   for (int round = 0; round < kRobustRounds; ++round) {
     const BundleSolution at = solve_bundle_adjustment(job.network, stage.geometry, stage.sightings,
@@ -133,6 +137,7 @@ double solve_robustly(const Job& job, Stage& stage) {
     limit2 = next;
     solve(job, stage, std::sqrt(limit2));
   }
+  stage.settings.converged = BundleSettings{}.converged;
   return limit2;
 }
 
@@ -184,6 +189,7 @@ void reject_outliers(const Job& job, Stage& stage, double robust_limit2) {
   for (std::size_t s = 0; s < stage.sightings.size(); ++s) {
     if (at.squares[s] > robust_limit2) stage.sightings[s].status = SightingStatus::outlier;
   }
+  stage.settings.converged = kRoughlyConverged;
   const double base8 = chi2_quantile(8, job.options.outlier_probability);
   const double base6 = chi2_quantile(6, job.options.outlier_probability);
   for (int round = 0; round < kOutlierRounds; ++round) {
@@ -223,6 +229,7 @@ void reject_outliers(const Job& job, Stage& stage, double robust_limit2) {
     }
     if (!changed) break;
   }
+  stage.settings.converged = BundleSettings{}.converged;
 }
 
 // Variance factor by iteration: the observations' covariances are scaled until they promise what is seen.

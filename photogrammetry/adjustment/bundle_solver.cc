@@ -9,7 +9,6 @@ namespace {
 
 constexpr double kFirstDamping = 1e-6;
 constexpr double kLastDamping = 1e8;
-constexpr double kConverged = 1e-9;    // decrease of the sum of squares still to be had
 constexpr double kBehindCamera = 1e6;  // cost of a sighting that does not project
 
 double robust_cost(double q, double limit2) { return limit2 > 0 ? limit2 * q / (limit2 + q) : q; }
@@ -122,12 +121,12 @@ BundleSolution solve_bundle_adjustment(const Network& network, const NetworkGeom
     const NetworkGeometry next = stepped(solution.geometry, layout, step);
     std::vector<double> squares;
     const double next_cost = total_cost(network, next, sightings, layout, settings, robust_limit, squares);
-    if (!(next_cost <= cost * (1 + 1e-12) + kConverged)) {
+    if (!(next_cost <= cost * (1 + 1e-12) + settings.converged)) {
       damping = damping == 0 ? kFirstDamping : damping * 10;
       if (damping > kLastDamping) break;
       continue;
     }
-    solution.converged = step.predicted_decrease < kConverged + 1e-13 * cost;
+    solution.converged = step.predicted_decrease < settings.converged + 1e-13 * cost;
     damping = damping <= kFirstDamping ? 0 : damping / 10;
     solution.geometry = next;
     solution.squares = std::move(squares);

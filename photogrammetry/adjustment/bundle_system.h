@@ -32,6 +32,7 @@ struct BundleSettings {
   double flatness_sigma_mm = 0;            ///< and out of it
   double print_scale_sigma = 0;            ///< prior of the print scale; 0: none
   std::vector<double> interior_inflation;  ///< per camera: factor on the calibration's sigmas
+  double converged = 1e-9;                 ///< decrease of the sum of squares that is no longer worth a step
   bool interior_moves = true;              ///< false: kept, but its uncertainty goes into the covariances
 };
 
