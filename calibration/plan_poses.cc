@@ -117,7 +117,7 @@ class Criterion {
 // The candidates that would help most beside those chosen.
 std::vector<std::size_t> shortlist(const std::vector<Whitened>& measured, const Criterion& criterion,
                                    const Eigen::MatrixXd& covariance) {
-  constexpr std::size_t kShortlisted = 150;
+  constexpr std::size_t kShortlisted = 50;
   const Eigen::MatrixXd weighted = criterion.weighted(covariance);
   std::vector<std::pair<double, std::size_t>> by_gain;
   for (std::size_t i = 0; i < measured.size(); ++i)
