@@ -88,15 +88,23 @@ double prior_information(const Job& job, const Stage& stage) {
   return priors.normal.bottomRightCorner(n, n).cwiseProduct(stage.covariance.bottomRightCorner(n, n)).sum();
 }
 
-void solve(const Job& job, Stage& stage, double robust_limit) {
-  BundleSolution solution =
-      solve_bundle_adjustment(job.network, stage.geometry, stage.sightings, stage.layout, stage.settings,
-                              robust_limit, kMaxIterations);
+void solve(const Job& job, Stage& stage, double robust_limit, const BundleSettings& settings) {
+  BundleSolution solution = solve_bundle_adjustment(job.network, stage.geometry, stage.sightings,
+                                                    stage.layout, settings, robust_limit, kMaxIterations);
   stage.geometry = std::move(solution.geometry);
   stage.converged = solution.converged;
   stage.iterations += solution.iterations;
   stage.squares = 0;
   for (const double q : solution.squares) stage.squares += std::max(0.0, q);
+}
+
+void solve(const Job& job, Stage& stage) { solve(job, stage, 0, stage.settings); }
+
+// While outliers are sought, a tenth of a standard deviation is near enough.
+void solve_roughly(const Job& job, Stage& stage, double robust_limit) {
+  BundleSettings settings = stage.settings;
+  settings.converged = 0.01;
+  solve(job, stage, robust_limit, settings);
 }
 
 // System, covariance and redundancy at the present solution.
@@ -118,12 +126,8 @@ void analyse(const Job& job, Stage& stage) {
   stage.redundancy = rows - unknowns + prior_information(job, stage);
 }
 
-// While outliers are sought, a tenth of a standard deviation is near enough.
-constexpr double kRoughlyConverged = 0.01;
-
 // Graduated robust adjustment: the limit follows the median of the sightings' squares until both settle.
 double solve_robustly(const Job& job, Stage& stage) {
-  stage.settings.converged = kRoughlyConverged;
   double limit2 = 0;
   for (int round = 0; round < kRobustRounds; ++round) {
     const BundleSolution at = solve_bundle_adjustment(job.network, stage.geometry, stage.sightings,
@@ -135,9 +139,8 @@ double solve_robustly(const Job& job, Stage& stage) {
     const double next = kRobustWidth * kRobustWidth * 8 * std::max(1.0, median(squares) / kMedianChi2Of8);
     if (round > 0 && next > 0.5 * limit2) break;
     limit2 = next;
-    solve(job, stage, std::sqrt(limit2));
+    solve_roughly(job, stage, std::sqrt(limit2));
   }
-  stage.settings.converged = BundleSettings{}.converged;
   return limit2;
 }
 
@@ -189,11 +192,10 @@ void reject_outliers(const Job& job, Stage& stage, double robust_limit2) {
   for (std::size_t s = 0; s < stage.sightings.size(); ++s) {
     if (at.squares[s] > robust_limit2) stage.sightings[s].status = SightingStatus::outlier;
   }
-  stage.settings.converged = kRoughlyConverged;
   const double base8 = chi2_quantile(8, job.options.outlier_probability);
   const double base6 = chi2_quantile(6, job.options.outlier_probability);
   for (int round = 0; round < kOutlierRounds; ++round) {
-    solve(job, stage, 0);
+    solve_roughly(job, stage, 0);
     analyse(job, stage);
     const std::vector<SightingTest> tests =
         test_sightings(job.network, stage.geometry, stage.sightings, stage.layout, stage.settings,
@@ -229,7 +231,6 @@ void reject_outliers(const Job& job, Stage& stage, double robust_limit2) {
     }
     if (!changed) break;
   }
-  stage.settings.converged = BundleSettings{}.converged;
 }
 
 // Variance factor by iteration: the observations' covariances are scaled until they promise what is seen.
@@ -241,7 +242,7 @@ void fit_variance_factor(const Job& job, Stage& stage) {
     if (stage.redundancy < kEnoughRedundancy) factor = std::max(factor, 1.0 / stage.settings.data_variance);
     if (std::abs(factor - 1) < 0.005) break;
     stage.settings.data_variance = std::max(1e-12, stage.settings.data_variance * factor);
-    solve(job, stage, 0);
+    solve(job, stage);
     analyse(job, stage);
   }
 }
@@ -260,7 +261,7 @@ bool loosen_interior(const Job& job, Stage& stage) {
     loosened = true;
   }
   if (!loosened) return false;
-  solve(job, stage, 0);
+  solve(job, stage);
   analyse(job, stage);
   return true;
 }
@@ -287,7 +288,7 @@ void fit_shape_priors(const Job& job, Stage& stage) {
     };
     stage.settings.squareness_sigma_mm = fitted(0, job.options.squareness_sigma_mm);
     stage.settings.flatness_sigma_mm = fitted(1, job.options.flatness_sigma_mm);
-    solve(job, stage, 0);
+    solve(job, stage);
     analyse(job, stage);
     if (std::abs(stage.settings.squareness_sigma_mm / sigma[0] - 1) < 0.02 &&
         std::abs(stage.settings.flatness_sigma_mm / sigma[1] - 1) < 0.02) {
@@ -301,7 +302,7 @@ bool corners_ask_to_be_free(const Job& job, Stage& stage) {
   Stage free = stage;
   free.layout =
       make_bundle_layout(job.network, stage.geometry, stage.sightings, true, stage.layout.print_scale >= 0);
-  solve(job, free, 0);
+  solve(job, free);
   analyse(job, free);
   const double gained = stage.redundancy - free.redundancy;
   if (gained < 1 || free.redundancy < 1) return false;
@@ -360,7 +361,7 @@ AdjustmentResult adjust_network(const Network& network, const AdjustmentOptions&
   const double robust_limit2 = solve_robustly(job, stage);
   reject_outliers(job, stage, robust_limit2);
   new_layout();
-  solve(job, stage, 0);
+  solve(job, stage);
   analyse(job, stage);
   if (options.shape == AdjustmentOptions::Shape::automatic && corners_ask_to_be_free(job, stage)) {
     free_shape = true;
@@ -374,7 +375,7 @@ AdjustmentResult adjust_network(const Network& network, const AdjustmentOptions&
     new_layout();
     reject_outliers(job, stage, solve_robustly(job, stage));
     new_layout();
-    solve(job, stage, 0);
+    solve(job, stage);
     analyse(job, stage);
   }
   fit_variance_factor(job, stage);

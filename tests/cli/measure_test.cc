@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include "tests/support/run_hexcal.h"
+#include "tests/support/sample_campaign.h"
 
 namespace hexcal {
 namespace {
@@ -15,14 +16,7 @@ using ::testing::HasSubstr;
 // Home and one pose of the sample campaign, with one thing spoilt by the test.
 class Measure : public ::testing::Test {
  protected:
-  void SetUp() override {
-    const fs::path sample = fs::path(HEXCAL_SOURCE) / "samples" / "small_lab";
-    fs::create_directories(lab_ / "poses");
-    for (const fs::directory_entry& entry : fs::directory_iterator(sample))
-      if (entry.is_regular_file()) fs::copy(entry.path(), lab_ / entry.path().filename());
-    for (const char* pose : {"home", "p001"})
-      fs::copy(sample / "poses" / pose, lab_ / "poses" / pose, fs::copy_options::recursive);
-  }
+  void SetUp() override { copy_sample_campaign(lab_, {"home", "p001"}); }
 
   void replace(const std::string& file, const std::string& old_text, const std::string& new_text) {
     std::string text = contents(lab_ / file);

@@ -5,6 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/support/run_hexcal.h"
+#include "tests/support/sample_campaign.h"
 #include "tools/io/pose_table.h"
 
 namespace hexcal {
@@ -18,19 +19,11 @@ using Change = std::function<void(const fs::path& jpeg)>;
 std::vector<PoseRecord> poses_after(const Change& change) {
   const TemporaryFolder folder;
   const fs::path lab = folder.path() / "lab";
-  const fs::path sample = fs::path(HEXCAL_SOURCE) / "samples" / "small_lab";
-  fs::create_directories(lab / "poses");
-  for (const fs::directory_entry& entry : fs::directory_iterator(sample)) {
-    if (entry.is_regular_file()) fs::copy(entry.path(), lab / entry.path().filename());
-  }
-  for (const char* pose : {"home", "p001"}) {
-    fs::create_directories(lab / "poses" / pose);
-    for (const fs::directory_entry& entry : fs::directory_iterator(sample / "poses" / pose)) {
-      const fs::path copy = lab / "poses" / pose / entry.path().filename();
-      fs::copy(entry.path(), copy);
-      change(copy);
-    }
-  }
+  copy_sample_campaign(lab, {"home", "p001"});
+  std::vector<fs::path> photographs;  // first: a change may put files beside them
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(lab / "poses"))
+    if (entry.is_regular_file()) photographs.push_back(entry.path());
+  for (const fs::path& photograph : photographs) change(photograph);
   const CommandResult result = run_hexcal({"measure", lab.string()});
   EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
   return read_pose_table(lab / "results" / "poses.csv");

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "tests/support/run_hexcal.h"
+#include "tests/support/sample_campaign.h"
 #include "tools/io/pose_table.h"
 
 namespace hexcal {
@@ -25,10 +26,8 @@ constexpr const char* kPoseHead = "pose,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_de
 class Plan : public ::testing::Test {
  protected:
   void SetUp() override {
-    const fs::path sample = fs::path(HEXCAL_SOURCE) / "samples" / "small_lab";
+    copy_sample_campaign(lab_);
     fs::create_directories(lab_ / "results");
-    for (const fs::directory_entry& entry : fs::directory_iterator(sample))
-      if (entry.is_regular_file()) fs::copy(entry.path(), lab_ / entry.path().filename());
     write(lab_ / "results/photos.csv",
           "photo,pose,status,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\n"
           "home/1.jpg,home,ok,572.7,-366.9,124.2,-101.56,-0.76,57.60\n"

@@ -8,8 +8,6 @@ written twice. Checks that every pose is announced once and that the last poses.
   drop_photographs.py --hexcal build/release/hexcal --campaign samples/small_lab --poses 3
 """
 
-import argparse
-import pathlib
 import random
 import shutil
 import signal
@@ -18,6 +16,8 @@ import sys
 import tempfile
 import threading
 import time
+
+from sample_lab import argument_parser, copy_without_photographs
 
 
 def drop(source, target, rng):
@@ -68,26 +68,17 @@ def without_header(path):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--hexcal", required=True, type=pathlib.Path)
-    parser.add_argument("--campaign", required=True, type=pathlib.Path)
+    parser = argument_parser(__doc__)
     parser.add_argument("--poses", type=int, default=1000, help="beside home")
     parser.add_argument("--pause-s", type=float, default=0.3, help="longest pause between two photographs")
     parser.add_argument("--pose-pause-s", type=float, default=0, help="pause after the last photograph of a pose")
     parser.add_argument("--limit-s", type=float, help="a pose may take this long after its last photograph")
     parser.add_argument("--prefix", default="", help="before the command of the watch, such as 'nice -n -10'")
-    parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
     rng = random.Random(args.seed)
 
     with tempfile.TemporaryDirectory() as folder:
-        lab = pathlib.Path(folder) / "lab"
-        lab.mkdir()
-        for file in args.campaign.iterdir():
-            if file.is_file():
-                shutil.copy(file, lab)
-        poses = sorted(p.name for p in (args.campaign / "poses").iterdir())
-        poses = ["home"] + [p for p in poses if p != "home"][:args.poses]
+        lab, poses = copy_without_photographs(args.campaign, folder, args.poses)
         left = {pose: sorted((args.campaign / "poses" / pose).iterdir()) for pose in poses}
         watch = subprocess.Popen([*args.prefix.split(), args.hexcal, "watch", lab], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                                  text=True)

@@ -7,7 +7,6 @@ the clean answer.
   kill_at_random.py --hexcal build/release/hexcal --campaign samples/small_lab --kills 50
 """
 
-import argparse
 import pathlib
 import random
 import shutil
@@ -15,6 +14,8 @@ import subprocess
 import sys
 import tempfile
 import time
+
+from sample_lab import argument_parser, copy_without_photographs
 
 
 def results(lab):
@@ -24,23 +25,15 @@ def results(lab):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--hexcal", required=True, type=pathlib.Path)
-    parser.add_argument("--campaign", required=True, type=pathlib.Path)
+    parser = argument_parser(__doc__)
     parser.add_argument("--command", default="measure", choices=["measure", "run"])
     parser.add_argument("--poses", type=int, default=2, help="beside home")
     parser.add_argument("--kills", type=int, default=6)
-    parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
     rng = random.Random(args.seed)
 
     with tempfile.TemporaryDirectory() as folder:
-        lab = pathlib.Path(folder) / "lab"
-        lab.mkdir()
-        for file in args.campaign.iterdir():
-            if file.is_file():
-                shutil.copy(file, lab)
-        poses = ["home"] + sorted(p.name for p in (args.campaign / "poses").iterdir() if p.name != "home")[:args.poses]
+        lab, poses = copy_without_photographs(args.campaign, folder, args.poses)
         for pose in poses:
             shutil.copytree(args.campaign / "poses" / pose, lab / "poses" / pose)
         command = [args.hexcal, args.command, lab]

@@ -209,7 +209,9 @@ void run_scene(const fs::path& campaign, const std::vector<Detector>& chosen) {
   std::fflush(stdout);
 }
 
-void run_clutter(int photographs, const std::vector<Detector>& chosen) {
+// Without a camera the detectors that use one are others over again.
+void run_clutter(int photographs, std::vector<Detector> chosen) {
+  std::erase_if(chosen, [](const Detector& detector) { return detector.uses_camera; });
   const MarkerFamily& family = marker_family("tag36h11");
   std::vector<int> trusted(chosen.size());
   std::vector<int> listed(chosen.size());

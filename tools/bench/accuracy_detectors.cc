@@ -70,32 +70,32 @@ std::vector<MarkerObservation> aruco_markers(const cv::Mat& grey, cv::aruco::Cor
 const std::vector<Detector>& detectors() {
   using Family = MarkerFamily;
   static const std::vector<Detector> all{
-      {"hexcal", true,
+      {"hexcal", true, false,
        [](const cv::Mat& g, const Family& family, const CameraModel*) {
          return detect_markers(g, ToneCurve::srgb, family);
        }},
-      {"hexcal, lens", true,
+      {"hexcal, lens", true, true,
        [](const cv::Mat& g, const Family& family, const CameraModel* camera) {
          return detect_markers(g, ToneCurve::srgb, family, {}, camera);
        }},
-      {"apriltag 1", false,
+      {"apriltag 1", false, false,
        [](const cv::Mat& g, const Family&, const CameraModel*) { return april_tags(g, 1); }},
-      {"apriltag 2", false,
+      {"apriltag 2", false, false,
        [](const cv::Mat& g, const Family&, const CameraModel*) { return april_tags(g, 2); }},
-      {"aruco none", false,
+      {"aruco none", false, false,
        [](const cv::Mat& g, const Family&, const CameraModel*) {
          return aruco_markers(g, cv::aruco::CORNER_REFINE_NONE, 0);
        }},
-      {"aruco subpix", false,
+      {"aruco subpix", false, false,
        [](const cv::Mat& g, const Family&, const CameraModel*) {
          return aruco_markers(g, cv::aruco::CORNER_REFINE_SUBPIX, 0);
        }},
-      {"aruco contour", false,
+      {"aruco contour", false, false,
        [](const cv::Mat& g, const Family&, const CameraModel*) {
          return aruco_markers(g, cv::aruco::CORNER_REFINE_CONTOUR, 0);
        }},
       // Its corners lie half a pixel towards the bottom right in OpenCV 4.6.
-      {"aruco apriltag", false, [](const cv::Mat& g, const Family&, const CameraModel*) {
+      {"aruco apriltag", false, false, [](const cv::Mat& g, const Family&, const CameraModel*) {
          return aruco_markers(g, cv::aruco::CORNER_REFINE_APRILTAG, 0.5);
        }}};
   return all;

@@ -13,7 +13,7 @@ namespace hexcal {
 struct Detector {
   std::string name;
   bool has_covariance = false;
-  /// `camera`: only the one that knows the lens uses it.
+  bool uses_camera = false;
   std::vector<MarkerObservation> (*detect)(const cv::Mat& grey, const MarkerFamily& family,
                                            const CameraModel* camera);
 };

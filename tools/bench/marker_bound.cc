@@ -38,23 +38,20 @@ std::optional<Eigen::Matrix3d> cells_from_px(const Corners& corners, const Marke
   return homography;
 }
 
-// Variance of a pixel's luminance after encoding, full scale 1.
-double encoded_variance(double light, const SensorOptions& sensor) {
-  const double electrons = sensor.full_well_electrons > 0 ? light / sensor.full_well_electrons : 0;
-  const double in_light = electrons + sensor.read_noise * sensor.read_noise;
-  constexpr double kStep = 1e-4;
-  const double low = std::max(light - kStep, 0.0);
-  const double slope = (toned(sensor.tone, light + kStep) - toned(sensor.tone, low)) / (light + kStep - low);
-  constexpr double kRounding = 1.0 / 12 / (255.0 * 255.0);
-  double channels = 0;
-  for (const double share : kLuma) channels += share * share;
-  return channels * (slope * slope * in_light + kRounding) + kRounding;
-}
-
 double tone_slope(double light, ToneCurveKind tone) {
   constexpr double kStep = 1e-4;
   const double low = std::max(light - kStep, 0.0);
   return (toned(tone, light + kStep) - toned(tone, low)) / (light + kStep - low);
+}
+
+// Variance of a pixel's luminance after encoding, full scale 1.
+double encoded_variance(double light, double slope, const SensorOptions& sensor) {
+  const double electrons = sensor.full_well_electrons > 0 ? light / sensor.full_well_electrons : 0;
+  const double in_light = electrons + sensor.read_noise * sensor.read_noise;
+  constexpr double kRounding = 1.0 / 12 / (255.0 * 255.0);
+  double channels = 0;
+  for (const double share : kLuma) channels += share * share;
+  return channels * (slope * slope * in_light + kRounding) + kRounding;
 }
 
 }  // namespace
@@ -111,7 +108,7 @@ std::optional<Eigen::Matrix<double, 8, 8>> corner_bound(const MarkerPattern& pat
       row[10] = slope * contrast * 0.5 *
                 (s.second.xx * by_variance(0, 0) + 2 * s.second.xy * by_variance(0, 1) +
                  s.second.yy * by_variance(1, 1));
-      information += row * row.transpose() / encoded_variance(light, sensor);
+      information += row * row.transpose() / encoded_variance(light, slope, sensor);
     }
   }
   const Eigen::LDLT<Eigen::Matrix<double, kParameters, kParameters>> decomposition(information);
