@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <fstream>
+#include <sstream>
 
 #include "tests/support/run_hexcal.h"
 
@@ -46,6 +47,22 @@ TEST(Completion, ZshAndFishScriptsParse) {
       EXPECT_THAT(shell_output(shell + " -n", result.out), IsEmpty());
     }
   }
+}
+
+// A command's description is one line of the help: its second line would be a sample that fell out of place.
+TEST(Completion, HelpHasOneLineACommand) {
+  std::istringstream help(run_hexcal({"--help"}).out);
+  int commands = 0;
+  bool listing = false;
+  for (std::string line; std::getline(help, line);) {
+    if (listing && !line.empty()) {
+      EXPECT_THAT(line, testing::MatchesRegex("  [a-z]+ +[A-Z].*"));
+      EXPECT_LE(line.size(), 115U) << line;
+      ++commands;
+    }
+    listing = listing || line == "Subcommands:";
+  }
+  EXPECT_GE(commands, 17);
 }
 
 TEST(Completion, ManualPageHoldsEveryCommandOfTheHelpAndSetsWithoutWarnings) {

@@ -3,19 +3,23 @@
 # calibrated, the poses are measured, the machine is identified, and corrected commands for other poses are tried on the
 # same machine. Ends with two tables: measured against true poses, and errors before and after compensation.
 # Usage: tools/dev/demo.sh [FOLDER]   (default build/demo; an existing folder is replaced)
+# With HEXCAL=PROGRAM nothing is installed or built and that program is run.
 set -euo pipefail
-cd "$(dirname "$0")/../.."
 folder=${1:-build/demo}
 poses=${HEXCAL_DEMO_POSES:-24}
 width=${HEXCAL_DEMO_WIDTH:-3008}
 
 step() { printf '\n== %s\n' "$*"; }
 
-tools/dev/setup.sh
-step "build"
-cmake --preset release --log-level=WARNING
-cmake --build --preset release --target hexcal
-hexcal=build/release/hexcal
+hexcal=${HEXCAL:-}
+if [ -z "$hexcal" ]; then
+  cd "$(dirname "$0")/../.."
+  tools/dev/setup.sh
+  step "build"
+  cmake --preset release --log-level=WARNING
+  cmake --build --preset release --target hexcal
+  hexcal=build/release/hexcal
+fi
 
 rm -rf "$folder"
 step "photograph a virtual hexapod with hidden errors: home and $poses poses, 3 photographs each, and a template"

@@ -30,9 +30,8 @@ struct ExportFlags {
   fs::path output;
 };
 
-constexpr const char* kSynopsis =
-    R"(Write a camera, a model or commands in another program's format, or read a camera from it.
-
+constexpr const char* kExportFooter =
+    R"(Sample use:
   hexcal export camera.yaml --to opencv -o opencv.yml
   hexcal export ost.yaml --to hexcal -o camera.yaml      (OpenCV, ROS, PhotoModeler values)
   hexcal export model.yaml --to linuxcnc -o machine.hal
@@ -171,12 +170,15 @@ int run_export(const ExportFlags& flags) {
 
 void add_export_command(CLI::App& app, Action& action) {
   auto flags = std::make_shared<ExportFlags>();
-  CLI::App* command = app.add_subcommand("export", kSynopsis);
+  std::vector<std::string> formats = camera_export_formats();
+  formats.insert(formats.end(), {"hexcal", "linuxcnc", "pi-gcs", "csv"});
+  CLI::App* command = app.add_subcommand(
+      "export", "Write a camera, model or commands in another program's format, or read a camera");
+  command->footer(kExportFooter);
   command
       ->add_option("FILE", flags->input,
                    "camera.yaml, model.yaml, actuators.csv, predicted_poses.csv, or another program's camera "
-                   "with --to "
-                   "hexcal")
+                   "with --to hexcal")
       ->required()
       ->check(CLI::ExistingFile);
   command
@@ -184,7 +186,8 @@ void add_export_command(CLI::App& app, Action& action) {
                    fmt::format("camera: {}, or hexcal to read one; model: linuxcnc; poses: pi-gcs, csv; "
                                "actuators: csv",
                                fmt::join(camera_export_formats(), ", ")))
-      ->required();
+      ->required()
+      ->check(CLI::IsMember(formats));
   command->add_option("-o,--output", flags->output, "file to write")->required();
   command->callback([flags, &action] { action = [flags] { return run_export(*flags); }; });
 }

@@ -122,9 +122,8 @@ int measure(MeasureFlags flags) {
 }  // namespace
 
 void add_measure_command(CLI::App& app, Action& action) {
-  CLI::App* command = app.add_subcommand(
-      "measure",
-      "Photographs of a campaign to poses.csv: detection, bundle adjustment, datum frames, covariances");
+  CLI::App* command =
+      app.add_subcommand("measure", "Photographs of a campaign to poses.csv, with standard deviations");
   command->footer(
       "Example:\n  hexcal measure campaign/\n"
       "  pose    x_mm    y_mm     z_mm  roll_deg  pitch_deg  yaw_deg  sigma_um  sigma_mdeg  photos  markers  "

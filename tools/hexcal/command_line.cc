@@ -5,8 +5,9 @@
 namespace hexcal {
 namespace {
 
-std::string trimmed(const std::string& text) {
-  const std::size_t first = text.find_first_not_of(" \n");
+// Without white space at its ends; `leading` says what counts as such in front.
+std::string trimmed(const std::string& text, const char* leading = " \n") {
+  const std::size_t first = text.find_first_not_of(leading);
   if (first == std::string::npos) return "";
   return text.substr(first, text.find_last_not_of(" \n") - first + 1);
 }
@@ -53,8 +54,8 @@ CommandLine command_line_of(const CLI::App& app) {
   const std::string text = app.get_description();
   out.description = trimmed(text.substr(0, text.find('\n')));
   if (out.description.starts_with(out.name + ": ")) out.description.erase(0, out.name.size() + 2);
-  if (text.find('\n') != std::string::npos) out.details = trimmed(text.substr(text.find('\n')));
-  const std::string footer = trimmed(app.get_footer());
+  if (text.find('\n') != std::string::npos) out.details = trimmed(text.substr(text.find('\n')), "\n");
+  const std::string footer = trimmed(app.get_footer(), "\n");  // its first line may be an indented sample
   if (!footer.empty()) out.details += (out.details.empty() ? "" : "\n\n") + footer;
   for (const CLI::Option* option : app.get_options()) out.options.push_back(option_of(*option));
   // An empty group hides an option or a command from --help; it stays hidden here.
