@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/report/sample_campaign.h"
+#include "tests/report/sample_report.h"
 #include "tests/report/well_formed.h"
 #include "tools/report/campaign_report.h"
 
@@ -12,42 +12,6 @@ using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
-
-const CampaignReport& sample_report() {
-  static const CampaignReport report = [] {
-    SampleCampaign campaign = sample_campaign(10);
-    campaign.measured[2].pose.reset();
-    campaign.measured[2].sigma.reset();
-    campaign.measured[2].status = "no <markers> & no light";
-    *campaign.measured[5].sigma *= 5;
-    CampaignReport out;
-    out.name = "<Tiger> & Co";
-    out.poses = campaign.measured;
-    out.targets = campaign.targets;
-    CompensationPart part;
-    part.nominal = sample_hexapod();
-    for (std::size_t i = 0; i < campaign.measured.size(); ++i) {
-      if (!campaign.measured[i].pose) continue;
-      PoseObservation observation;
-      observation.id = campaign.targets[i].id;
-      observation.target = campaign.targets[i].pose;
-      observation.measured = *campaign.measured[i].pose;
-      observation.covariance = campaign.measured[i].sigma->cwiseAbs2().asDiagonal();
-      observation.readings = readings_from_lengths(
-          part.nominal, leg_lengths(part.nominal, part.nominal.B_from_P(*observation.target)));
-      part.observations.poses.push_back(observation);
-    }
-    CalibrateOptions options;
-    options.method = "option3";
-    options.comparison.leave_one_out_up_to = 0;
-    options.comparison.folds = 2;
-    part.calibration = calibrate(part.nominal, part.observations, options);
-    out.compensation = part;
-    out.provenance = {{"program", "hexcal"}};
-    return out;
-  }();
-  return report;
-}
 
 TEST(CampaignReport, JudgesEachPoseWithWords) {
   const std::vector<PoseJudgement> judgements = judge_poses(sample_report().poses);
@@ -93,14 +57,48 @@ TEST(CampaignReport, EveryFigureIsWellFormed) {
   }
 }
 
-TEST(CampaignReport, ASecondRoundStandsBesideTheFirst) {
+TEST(CampaignReport, APoseThatDefinesTheFrameIsNotJudged) {
+  std::vector<PoseRecord> poses = sample_report().poses;
+  poses[0].sigma->setZero();
+  EXPECT_EQ(judge_poses(poses)[0].light, Light::none);
+  EXPECT_THAT(judge_poses(poses)[0].words, HasSubstr("defines"));
+}
+
+TEST(CampaignReport, FiguresOfTheirOwnAreForThePapersOptionsAndTheChosenMethod) {
+  const PaperData data = paper_data(sample_report());
+  int with_figures = 0;
+  for (const MethodPoses& method : data.methods) {
+    EXPECT_NE(method.name, "none");
+    with_figures += method.has_figures ? 1 : 0;
+  }
+  EXPECT_GE(with_figures, 3);
+  EXPECT_LE(with_figures, 4);
+}
+
+TEST(CampaignReport, TheNetworkShowsItsPhotographsAndWhatIsWrongWithThem) {
+  const std::string page = render_page(campaign_page(sample_report()));
+  EXPECT_THAT(page, HasSubstr("id=\"residual_vectors\""));
+  EXPECT_THAT(page, HasSubstr("marker 103: contradicts the rest"));
+  EXPECT_THAT(page, HasSubstr("Photographs that need a look"));
+  EXPECT_THAT(page, HasSubstr("no markers: the room was dark"));
+  EXPECT_THAT(page, HasSubstr("data:image/jpeg;base64,/9j/"));
+  const Verdict verdict = campaign_verdict(sample_report());
+  EXPECT_THAT(verdict.findings, ::testing::Contains("Marker 103 moved."));
+}
+
+TEST(CampaignReport, ALargeCampaignStaysSmall) {
   CampaignReport report = sample_report();
-  report.second_round_name = "round 2";
-  report.second_round = report.targets;  // a machine without errors
-  EXPECT_THAT(campaign_verdict(report).findings[0], HasSubstr("round 2"));
-  const PaperData data = paper_data(report);
-  EXPECT_EQ(data.methods.back().name, "round 2");
-  EXPECT_THAT(render_page(campaign_page(report)), HasSubstr("measured again"));
+  const PhotographPart photograph = report.network->photographs[0];
+  // 400 photographs of 40 markers each, without their pictures.
+  PhotographPart crowded = photograph;
+  crowded.thumbnail_jpeg.clear();
+  while (crowded.outlines.size() < 40) {
+    crowded.outlines.push_back(photograph.outlines[0]);
+    crowded.residuals.insert(crowded.residuals.end(), photograph.residuals.begin(),
+                             photograph.residuals.begin() + 4);
+  }
+  report.network->photographs.assign(400, crowded);
+  EXPECT_LT(render_page(campaign_page(report)).size(), 5'000'000U);
 }
 
 }  // namespace

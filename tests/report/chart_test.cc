@@ -137,7 +137,7 @@ TEST(Chart, HeatColoursRiseInLightness) {
 }
 
 TEST(Scene3d, StillPictureIsWellFormedAndHoldsAllParts) {
-  const std::string svg = scene_svg_file(sample_scene(), 0);
+  const std::string svg = scene_svg_file(sample_scene());
   EXPECT_THAT(svg, IsWellFormedXml());
   for (const char* part : {">UG<", ">LG<", ">DSC_0000<", "marker 103"}) EXPECT_THAT(svg, HasSubstr(part));
 }

@@ -1,12 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <fstream>
-
 #include "tests/report/sample_charts.h"
 #include "tests/report/well_formed.h"
-#include "tests/support/temporary_folder.h"
 #include "tools/report/html_page.h"
 #include "tools/report/page_resources.h"
 
@@ -74,39 +70,6 @@ TEST(Page, EveryInkOfTheChartsHasItsColourInThePage) {
     EXPECT_THAT(style, HasSubstr(".f-" + name + " { fill: var(--" + name + "); }"));
     EXPECT_THAT(style, HasSubstr(".k-" + name + " { stroke: var(--" + name + "); }"));
   }
-}
-
-// Loads the page in the browser with a script that sorts a table, turns the view and reports by the title.
-TEST(Page, WorksInAHeadlessBrowserWithoutConsoleErrors) {
-  if (std::system("command -v chromium >/dev/null 2>&1") != 0) GTEST_SKIP() << "chromium is not installed";
-  const TemporaryFolder folder;
-  std::string page = render_page(sample_page());
-  const std::string probe = R"(<script>
-    const header = document.querySelectorAll("table.sortable th button")[1];
-    header.click();
-    const first = document.querySelector("table.sortable tbody tr").cells[0].textContent;
-    header.click();
-    const last = document.querySelector("table.sortable tbody tr:last-child").cells[0].textContent;
-    const sort = header.parentElement.getAttribute("aria-sort");
-    const scene = document.getElementById("scene");
-    const shown = scene.dataset.ready === "true" || !document.getElementById("scene-note").hidden;
-    if (scene.dataset.ready) document.getElementById("scene-left").click();
-    document.body.dataset.probe = [first, last, sort, shown, document.querySelectorAll("svg.chart").length].join(" ");
-    </script></body>)";
-  page.replace(page.find("</body>"), 7, probe);
-  const std::string file = (folder.path() / "page.html").string();
-  std::ofstream(file) << page;
-  const std::string command =
-      "timeout 100 chromium --headless --no-sandbox --disable-quic --no-first-run "
-      "--disable-background-networking "
-      "--disable-component-update --disable-sync --use-gl=angle --use-angle=swiftshader "
-      "--enable-unsafe-swiftshader "
-      "--enable-logging=stderr --virtual-time-budget=3000 --user-data-dir='" +
-      (folder.path() / "profile").string() + "' --dump-dom 'file://" + file + "' >'" +
-      (folder.path() / "dom").string() + "' 2>'" + (folder.path() / "log").string() + "'";
-  ASSERT_EQ(std::system(command.c_str()), 0);
-  EXPECT_THAT(contents(folder.path() / "dom"), HasSubstr("data-probe=\"a c descending true 2\""));
-  EXPECT_THAT(contents(folder.path() / "log"), Not(HasSubstr("CONSOLE")));
 }
 
 }  // namespace

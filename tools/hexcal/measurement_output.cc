@@ -14,6 +14,7 @@
 #include "tools/io/observations_file.h"
 #include "tools/io/point_cloud_file.h"
 #include "tools/io/pose_table.h"
+#include "tools/io/residual_file.h"
 
 namespace hexcal {
 namespace fs = std::filesystem;
@@ -86,6 +87,7 @@ std::vector<fs::path> write_results(const MeasureRequest& request, const OpenCam
   write(open.results / "markers.ply", format_markers_ply(head, result));
   write(open.results / "markers.pcd", format_markers_pcd(head, result));
   write(open.results / "epochs.csv", format_epoch_table(head, result));
+  write(open.results / "residuals.csv", format_residuals(head, observations, result));
   write(open.results / "quality.json", measurement_json(observations, result, open.listing));
   if (request.colmap) {
     for (const auto& [name, text] : format_colmap_model(observations, result)) {

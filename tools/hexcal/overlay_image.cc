@@ -8,6 +8,7 @@
 
 #include "photogrammetry/photograph/photograph.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/residual_file.h"
 
 namespace hexcal {
 namespace {
@@ -40,28 +41,6 @@ void draw_text(cv::Mat& image, const std::string& text, const Eigen::Vector2d& c
   cv::putText(image, text, at, cv::FONT_HERSHEY_SIMPLEX, scale, colour, width, cv::LINE_AA);
 }
 
-// Why a marker does not count.
-std::string reason_of(const Sighting* sighting, const MarkerObservation& seen) {
-  if (sighting == nullptr) return marker_status_name(seen.status);
-  switch (sighting->status) {
-    case SightingStatus::used:
-      return "";
-    case SightingStatus::not_measured:
-      return marker_status_name(seen.status);
-    case SightingStatus::unknown_id:
-      return "not of this campaign";
-    case SightingStatus::repeated_id:
-      return "id twice";
-    case SightingStatus::seen_once:
-      return "seen once";
-    case SightingStatus::unoriented:
-      return "not connected";
-    case SightingStatus::outlier:
-      return "contradicts the rest";
-  }
-  return "";
-}
-
 const cv::Scalar kUsed(90, 220, 90);
 const cv::Scalar kRejected(60, 60, 255);
 const cv::Scalar kNotMeasured(190, 190, 190);
@@ -87,7 +66,7 @@ void draw_marker(const Sighting* sighting, const MarkerObservation& seen, const 
   const double height = std::clamp(0.22 * seen.side_px, image.cols / 120.0, image.cols / 30.0);
   draw_text(image, std::to_string(seen.id), centre, height, colour);
   if (!used) {
-    draw_text(image, reason_of(sighting, seen), centre + Eigen::Vector2d(0, 1.3 * height), 0.55 * height,
+    draw_text(image, sighting_words(sighting, seen), centre + Eigen::Vector2d(0, 1.3 * height), 0.55 * height,
               colour);
   }
 }
@@ -117,15 +96,15 @@ std::optional<std::filesystem::path> write_overlay(const OpenCampaign& open,
   if (grey.depth() == CV_16U) grey.convertTo(grey, CV_8U, 1.0 / 257);
   cv::Mat image;
   cv::cvtColor(kDimming * grey, image, cv::COLOR_GRAY2BGR);
+  const auto places = sightings_by_id(result);
   for (const MarkerObservation& seen : observations.photographs[photograph].seen.markers) {
     const Sighting* found = nullptr;
     Vector8d residual = Vector8d::Zero();
-    for (std::size_t s = 0; s < result.adjusted.sightings.size(); ++s) {
-      const Sighting& sighting = result.adjusted.sightings[s];
-      if (sighting.photo != static_cast<int>(photograph) || sighting.marker < 0) continue;
-      if (result.network.markers[static_cast<std::size_t>(sighting.marker)].id != seen.id) continue;
-      found = &sighting;
-      if (s < result.adjusted.residuals_px.size()) residual = result.adjusted.residuals_px[s];
+    const auto place = places.find({static_cast<int>(photograph), seen.id});
+    if (place != places.end()) {
+      found = &result.adjusted.sightings[place->second];
+      if (place->second < result.adjusted.residuals_px.size())
+        residual = result.adjusted.residuals_px[place->second];
     }
     draw_marker(found, seen, residual, image);
   }

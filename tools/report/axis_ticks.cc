@@ -4,6 +4,12 @@
 #include <cmath>
 
 namespace hexcal {
+
+double round_number_below(double value) {
+  const double power = std::pow(10.0, std::floor(std::log10(value)));
+  const double share = value / power;
+  return power * (share >= 5 ? 5 : share >= 2 ? 2 : 1);
+}
 namespace {
 
 // Not finer than a double can tell apart at this magnitude.

@@ -4,6 +4,9 @@
 
 namespace hexcal {
 
+/// 1, 2 or 5 times a power of ten, not above a positive `value`.
+[[nodiscard]] double round_number_below(double value);
+
 /// Round numbers along an axis: `step` is 1, 2 or 5 times a power of ten, `low` and `high` are multiples of
 /// it.
 struct AxisTicks {

@@ -56,19 +56,12 @@ PaperData paper_data(const CampaignReport& report) {
   }
   if (report.compensation) {
     for (const CrossValidation& method : report.compensation->calibration.comparison.methods) {
-      if (method.failure.empty())
-        data.methods.push_back(method_poses(*report.compensation, method, data.pose_ids));
+      // No compensation leaves what was measured: that is `before`.
+      if (!method.failure.empty() || method.method == CompensationMethod::nominal) continue;
+      data.methods.push_back(method_poses(*report.compensation, method, data.pose_ids));
+      data.methods.back().has_figures = method.method != CompensationMethod::kinematic ||
+                                        method.name == report.compensation->calibration.chosen;
     }
-  }
-  if (!report.second_round.empty()) {
-    const std::map<std::string, Pose> again = poses_by_id(report.second_round);
-    MethodPoses round{report.second_round_name, "measured again", {}};
-    for (const std::string& id : data.pose_ids) {
-      const auto pose = again.find(id);
-      round.pairs.push_back(pose != again.end() ? std::optional(PosePair{targets.at(id), pose->second})
-                                                : std::nullopt);
-    }
-    data.methods.push_back(std::move(round));
   }
   return data;
 }
@@ -95,7 +88,8 @@ HtmlPage campaign_page(const CampaignReport& report) {
   }
   if (report.network) {
     page.sections.push_back({"view", "3D view", html_scene(report.network->scene)});
-    page.sections.push_back({"photographs", "Photographs", network_section(*report.network)});
+    page.sections.push_back({"network", "Residuals", network_section(*report.network)});
+    page.sections.push_back({"photographs", "Photographs", photographs_section(*report.network)});
     page.with_scene = true;
   } else if (!report.no_network.empty()) {
     page.sections.push_back({"photographs", "Photographs", html_paragraph(report.no_network)});
@@ -118,7 +112,7 @@ std::vector<Chart> campaign_charts(const CampaignReport& report) {
     const Chart chart = correction_chart(*report.compensation->calibration.identifiability);
     if (!chart.panels.empty()) charts.push_back(chart);
   }
-  if (report.network) charts.push_back(residual_chart(*report.network));
+  if (report.network && has_residuals(*report.network)) charts.push_back(residual_chart(*report.network));
   if (!report.cameras.empty()) charts.push_back(distortion_chart(report.cameras[0].camera));
   return charts;
 }

@@ -21,26 +21,50 @@ struct CompensationPart {
   CalibrationReport calibration;
 };
 
+/// A marker found in a photograph.
+struct MarkerOutline {
+  int id = -1;
+  std::array<Eigen::Vector2d, 4> corners_px;
+  bool used = true;   ///< by the adjustment
+  std::string words;  ///< why not used
+};
+
+struct CornerResidual {
+  Eigen::Vector2d at_px, by_px;  ///< observed place; observed minus projected
+  bool used = true;
+};
+
 /// What a photograph contributed.
 struct PhotographPart {
   std::string pose_id;
   std::string name;
-  std::string status;  ///< "ok", or why it was not used
+  std::string status;   ///< "ok", or why it was not used
+  std::string remarks;  ///< what should be known of a photograph that is ok
   int markers = 0;
   int rejected = 0;
   double rms_px = 0;
-  std::vector<Arrow> residuals;  ///< at the corners, px; observed minus projected
-  /// The markers' outlines, px, and whether the adjustment used them.
-  std::vector<std::pair<std::array<Eigen::Vector2d, 4>, bool>> outlines;
+  std::vector<CornerResidual> residuals;
+  std::vector<MarkerOutline> outlines;
   Eigen::Vector2d size_px = Eigen::Vector2d::Zero();
   std::string thumbnail_jpeg;  ///< bytes of a small JPEG; empty: only the drawing is shown
+};
+
+/// A known distance between two markers, measured.
+struct LengthPart {
+  std::string name;
+  std::optional<double> measured_mm;
+  double sigma_mm = 0;  ///< of the measured length
+  double stated_mm = 0;
 };
 
 /// The photogrammetric network.
 struct NetworkPart {
   double sigma0 = 0;
   double rms_px = 0;
-  double redundancy = 0;  ///< observations beyond those needed
+  double redundancy = 0;                                    ///< observations beyond those needed
+  std::vector<std::string> warnings;                        ///< of the campaign as a whole
+  std::vector<std::pair<std::string, std::string>> datums;  ///< frame and how it was found
+  std::vector<LengthPart> lengths;
   std::vector<PhotographPart> photographs;
   Scene3d scene;
 };
@@ -62,9 +86,6 @@ struct CampaignReport {
   std::optional<NetworkPart> network;
   std::string no_network;
   std::vector<CameraPart> cameras;
-  /// The poses of a second round or another campaign with the same targets, measured after compensation.
-  std::vector<PoseRecord> second_round;
-  std::string second_round_name;
   std::vector<std::pair<std::string, std::string>> provenance;  ///< term and value
 };
 
@@ -77,7 +98,7 @@ struct PoseJudgement {
 [[nodiscard]] std::vector<PoseJudgement> judge_poses(const std::vector<PoseRecord>& poses);
 
 /// The paper's data from a campaign: targets against measured poses, cross-validated errors of each method
-/// over the poses that it keeps in the workspace, and the second round's where there is one.
+/// over the poses that it keeps in the workspace.
 [[nodiscard]] PaperData paper_data(const CampaignReport& report);
 
 [[nodiscard]] Verdict campaign_verdict(const CampaignReport& report);

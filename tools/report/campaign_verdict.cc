@@ -10,6 +10,9 @@
 namespace hexcal {
 namespace {
 
+// A pose whose sigma is so many times the campaign's median is weak.
+constexpr double kWeakSigma = 3;
+
 double position_sigma(const PoseRecord& record) { return record.sigma->head<3>().norm(); }
 double orientation_sigma(const PoseRecord& record) { return record.sigma->tail<3>().norm(); }
 
@@ -52,8 +55,10 @@ void judge_measurement(const CampaignReport& report, Verdict& verdict) {
   const std::vector<PoseJudgement> judgements = judge_poses(report.poses);
   std::vector<std::string> failed, weak;
   for (std::size_t i = 0; i < judgements.size(); ++i) {
-    if (judgements[i].light == Light::bad) failed.push_back(report.poses[i].id);
-    if (judgements[i].light == Light::warning) weak.push_back(report.poses[i].id);
+    const std::string& id = report.poses[i].id;
+    if (judgements[i].light == Light::bad) failed.push_back(id);
+    if (judgements[i].light == Light::warning)
+      weak.push_back(fmt::format("{} ({})", id, judgements[i].words));
   }
   const std::size_t count = report.poses.size();
   if (!failed.empty()) {
@@ -65,6 +70,9 @@ void judge_measurement(const CampaignReport& report, Verdict& verdict) {
   if (!weak.empty()) {
     verdict.findings.push_back(
         fmt::format("{} measured with reservations: {}.", pose_count(weak.size()), listed(weak)));
+    verdict.next_steps.emplace_back(
+        "Photograph the poses with reservations again where they matter: three sharp photographs from "
+        "different sides.");
   }
   verdict.light = failed.empty() && weak.empty() ? Light::good : Light::warning;
   if (2 * failed.size() > count) verdict.light = Light::bad;
@@ -82,6 +90,8 @@ void judge_network(const NetworkPart& network, Verdict& verdict) {
         significant_text(network.sigma0, 2)));
     verdict.light = std::max(verdict.light, Light::warning);
   }
+  for (const std::string& warning : network.warnings) verdict.findings.push_back(sentence(warning));
+  if (!network.warnings.empty()) verdict.light = std::max(verdict.light, Light::warning);
   std::vector<std::string> unused;
   for (const PhotographPart& photograph : network.photographs) {
     if (photograph.status != "ok") unused.push_back(photograph.name);
@@ -90,6 +100,11 @@ void judge_network(const NetworkPart& network, Verdict& verdict) {
     verdict.findings.push_back(fmt::format("{} of {} photographs were not used: {}.", unused.size(),
                                            network.photographs.size(), listed(unused)));
   }
+}
+
+// An identified machine whose residuals are what the measurement's noise promises.
+bool fits_to_noise(const CalibrationReport& calibration) {
+  return calibration.fitted.identified && calibration.fitted.identified->sigma0 < 2;
 }
 
 void judge_compensation(const CampaignReport& report, const CrossValidation& method, Verdict& verdict) {
@@ -102,11 +117,10 @@ void judge_compensation(const CampaignReport& report, const CrossValidation& met
         "to {} deg rms ({} % less), judged on poses that the model had not seen.",
         method.name, significant_text(before.position_rms_mm, 3),
         significant_text(method.errors.position_rms_mm, 3),
-        significant_text(improvement_percent(before.position_rms_mm, method.errors.position_rms_mm), 3),
+        less_by_text(before.position_rms_mm, method.errors.position_rms_mm),
         significant_text(before.orientation_rms_rad * kDegPerRad, 3),
         significant_text(method.errors.orientation_rms_rad * kDegPerRad, 3),
-        significant_text(improvement_percent(before.orientation_rms_rad, method.errors.orientation_rms_rad),
-                         3));
+        less_by_text(before.orientation_rms_rad, method.errors.orientation_rms_rad));
     if (method.errors.position_rms_mm >= before.position_rms_mm) {
       verdict.light = Light::bad;
       verdict.findings.insert(verdict.findings.begin(),
@@ -118,6 +132,11 @@ void judge_compensation(const CampaignReport& report, const CrossValidation& met
     verdict.findings.push_back(
         "What remains is about the noise of the measurement itself: the machine may be better than can be "
         "seen here.");
+  } else if (noise_mm > 0 && method.errors.position_rms_mm > 10 * noise_mm && fits_to_noise(calibration)) {
+    verdict.findings.push_back(fmt::format(
+        "The model fits its poses to their noise, but {} poses are few for its {} numbers: at poses that it "
+        "has not seen {} times the noise remains. More poses would help, see `hexcal plan`.",
+        method.poses, method.complexity, significant_text(method.errors.position_rms_mm / noise_mm, 2)));
   } else if (noise_mm > 0 && method.errors.position_rms_mm > 10 * noise_mm) {
     verdict.findings.push_back(
         fmt::format("What remains is {} times the noise of the measurement: the machine does something that "
@@ -128,12 +147,20 @@ void judge_compensation(const CampaignReport& report, const CrossValidation& met
   if (!calibration.outliers.empty()) {
     verdict.findings.push_back(fmt::format("Left out as near singular: {}.", listed(calibration.outliers)));
   }
+  if (!calibration.unexplained.empty()) {
+    verdict.findings.push_back(
+        fmt::format("No model explains {}: measured wrongly, or the machine did not stand there. Left out.",
+                    listed(calibration.unexplained)));
+    verdict.next_steps.push_back(fmt::format("Photograph {} again.", listed(calibration.unexplained)));
+    verdict.light = std::max(verdict.light, Light::warning);
+  }
   if (calibration.identifiability) {
     for (const LegDiagnosis& leg : calibration.identifiability->legs) {
       if (leg.wrong) verdict.findings.push_back("Stands out: " + leg.sentence + ".");
     }
     if (!calibration.identifiability->advice.empty()) {
-      verdict.next_steps.push_back("To know the machine better: " + calibration.identifiability->advice);
+      verdict.next_steps.push_back(
+          sentence("To know the machine better: " + calibration.identifiability->advice));
     }
   }
   std::vector<std::string> lost;
@@ -147,31 +174,6 @@ void judge_compensation(const CampaignReport& report, const CrossValidation& met
   }
 }
 
-void judge_second_round(const CampaignReport& report, Verdict& verdict) {
-  const PaperData data = paper_data(report);
-  std::vector<PosePair> before, after;
-  for (std::size_t i = 0; i < data.pose_ids.size(); ++i) {
-    const auto& again = data.methods.back().pairs[i];
-    if (!again || !data.before.pairs[i]) continue;
-    before.push_back(*data.before.pairs[i]);
-    after.push_back(*again);
-  }
-  if (after.empty()) {
-    verdict.findings.push_back(
-        fmt::format("{} shares no measured pose with this campaign.", report.second_round_name));
-    return;
-  }
-  const ErrorStatistics b = error_statistics(before);
-  const ErrorStatistics a = error_statistics(after);
-  verdict.findings.insert(
-      verdict.findings.begin(),
-      fmt::format("Measured again in {} over {}: position {} to {} mm rms, orientation {} to {} deg rms.",
-                  report.second_round_name, pose_count(after.size()), significant_text(b.position_rms_mm, 3),
-                  significant_text(a.position_rms_mm, 3),
-                  significant_text(b.orientation_rms_rad * kDegPerRad, 3),
-                  significant_text(a.orientation_rms_rad * kDegPerRad, 3)));
-}
-
 }  // namespace
 
 std::vector<PoseJudgement> judge_poses(const std::vector<PoseRecord>& poses) {
@@ -181,14 +183,18 @@ std::vector<PoseJudgement> judge_poses(const std::vector<PoseRecord>& poses) {
   for (const PoseRecord& record : poses) {
     PoseJudgement judgement{Light::good, ""};
     if (!record.pose) {
-      judgement = {Light::bad, record.status};
+      judgement = {Light::bad, status_text(record.status)};
     } else if (record.status != "ok") {
-      judgement = {Light::warning, record.status};
-    } else if (has_sigma(record) &&
-               (position_sigma(record) > 3 * typical_mm || orientation_sigma(record) > 3 * typical_rad)) {
-      judgement = {Light::warning, "sigma more than 3 times the campaign's median"};
+      judgement = {Light::warning, status_text(record.status)};
+    } else if (record.sigma && !has_sigma(record)) {
+      judgement = {Light::none, "defines the home"};
     } else if (record.images && *record.images == 1) {
       judgement = {Light::warning, "a single photograph: nothing checks it"};
+    } else if (has_sigma(record)) {
+      const double times =
+          std::max(position_sigma(record) / typical_mm, orientation_sigma(record) / typical_rad);
+      if (times > kWeakSigma)
+        judgement = {Light::warning, fmt::format("sigma {:.0f} times the campaign's median", times)};
     }
     out.push_back(std::move(judgement));
   }
@@ -209,13 +215,11 @@ Verdict campaign_verdict(const CampaignReport& report) {
   if (const CrossValidation* method = chosen_method(report)) judge_compensation(report, *method, verdict);
   if (!report.compensation && !report.no_compensation.empty())
     verdict.next_steps.push_back(report.no_compensation);
-  if (!report.second_round.empty()) {
-    judge_second_round(report, verdict);
-  } else if (report.compensation && verdict.light != Light::bad) {
+  if (report.compensation && verdict.light != Light::bad) {
     verdict.next_steps.push_back(
-        "Send `results/actuators.csv` to the controller, photograph the same poses again and compare the two "
-        "rounds with "
-        "`hexcal report --compare`.");
+        "Send `results/actuators.csv` to the controller, photograph the same poses as a campaign of their "
+        "own "
+        "and compare: `hexcal report AGAIN --before THIS`.");
   }
   return verdict;
 }

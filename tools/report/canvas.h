@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace hexcal {
 
@@ -68,6 +69,8 @@ class Canvas {
   virtual ~Canvas() = default;
 
   virtual void polyline(std::span<const Eigen::Vector2d> points, const Stroke& stroke) = 0;
+  /// Many lines of one stroke, as one element: thousands of residual vectors stay small.
+  virtual void polylines(std::span<const std::vector<Eigen::Vector2d>> lines, const Stroke& stroke) = 0;
   virtual void polygon(std::span<const Eigen::Vector2d> points, const Paint& fill) = 0;
   virtual void rectangle(const Eigen::Vector2d& corner, const Eigen::Vector2d& size, const Paint& fill) = 0;
   virtual void circle(const Eigen::Vector2d& centre, double radius, const Paint& fill) = 0;

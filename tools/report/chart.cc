@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 #include "tools/report/markup.h"
 #include "tools/report/panel_frame.h"
@@ -23,7 +24,8 @@ std::string tip_of(const Panel& panel, const Series& series, std::size_t i, doub
   std::string tip = series.name;
   if (!tip.empty()) tip += ", ";
   tip += i < panel.x.categories.size() ? panel.x.categories[i] : significant_text(x_of(series, i), 4);
-  tip += ": " + number_text(series.y[i], step / 100);
+  tip +=
+      ": " + (panel.y.logarithmic ? significant_text(series.y[i], 3) : number_text(series.y[i], step / 100));
   if (!series.sigma.empty()) tip += " \xC2\xB1 " + number_text(series.sigma[i], step / 100);
   const std::size_t unit = panel.y.title.rfind('(');
   if (unit != std::string::npos)
@@ -126,15 +128,22 @@ void draw_cells(const Panel& panel, const PanelFrame& frame, Canvas& canvas) {
 }
 
 void draw_arrows(const Panel& panel, const PanelFrame& frame, Canvas& canvas) {
+  std::map<Ink, std::vector<std::vector<Vector2d>>> plain;  // without tips: one element for all of an ink
   for (const Arrow& arrow : panel.arrows) {
     if (!arrow.from.allFinite() || !arrow.by.allFinite()) continue;
+    if (arrow.tip.empty()) {
+      plain[arrow.ink].push_back(
+          {frame.pixel(arrow.from), frame.pixel(arrow.from + panel.arrow_scale * arrow.by)});
+      continue;
+    }
     const Vector2d from = frame.pixel(arrow.from);
     const Vector2d to = frame.pixel(arrow.from + panel.arrow_scale * arrow.by);
-    if (!arrow.tip.empty()) canvas.begin_tip(arrow.tip);
-    canvas.line(from, to, {{arrow.ink}, 1});
-    canvas.circle(from, 1.3, {arrow.ink});
-    if (!arrow.tip.empty()) canvas.end_tip();
+    canvas.begin_tip(arrow.tip);
+    canvas.line(from, to, {{arrow.ink}, 1.2});
+    canvas.circle(from, 1.6, {arrow.ink});
+    canvas.end_tip();
   }
+  for (const auto& [ink, lines] : plain) canvas.polylines(lines, {{ink, 0.7}, 0.8});
 }
 
 }  // namespace

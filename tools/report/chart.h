@@ -41,6 +41,7 @@ struct Axis {
   std::string title;                    ///< with its unit: "error (mm)"
   std::vector<std::string> categories;  ///< empty: numbers
   std::optional<double> low, high;      ///< default: what the data need
+  bool logarithmic = false;             ///< of a y axis with values above zero
 };
 
 /// One pair of axes with what is drawn in it.

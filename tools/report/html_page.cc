@@ -11,20 +11,6 @@
 namespace hexcal {
 namespace {
 
-std::string_view light_class(Light light) {
-  switch (light) {
-    case Light::none:
-      return "none";
-    case Light::good:
-      return "good";
-    case Light::warning:
-      return "warning";
-    case Light::bad:
-      return "bad";
-  }
-  return "none";
-}
-
 // Words with `backquoted` parts as code.
 Html with_code(std::string_view text) {
   Html out;
@@ -40,7 +26,7 @@ Html with_code(std::string_view text) {
 }
 
 Html light_mark(Light light) {
-  return {fmt::format(R"(<span class="light {}" aria-hidden="true"></span>)", light_class(light))};
+  return {fmt::format(R"(<span class="light {}" aria-hidden="true"></span>)", light_name(light))};
 }
 
 Html table_head(const HtmlTable& table) {
@@ -56,8 +42,13 @@ Html table_head(const HtmlTable& table) {
   return {"<thead><tr>" + out + "</tr></thead>"};
 }
 
+constexpr std::size_t kLongWords = 28;  // bytes; longer words wrap
+constexpr std::size_t kLongTable = 24;  // rows; a longer table scrolls by itself
+
 Html table_cell(const HtmlCell& cell, bool numeric, bool row_header) {
-  std::string attributes = numeric ? "" : R"( class="words")";
+  std::string attributes = numeric                         ? ""
+                           : cell.text.size() > kLongWords ? R"( class="words long")"
+                                                           : R"( class="words")";
   if (cell.sort_key) attributes += fmt::format(R"( data-v="{:.9g}")", *cell.sort_key);
   if (!cell.hint.empty()) attributes += " title=\"" + markup_escaped(cell.hint) + '"';
   if (row_header) attributes += R"( scope="row")";
@@ -80,6 +71,20 @@ Html html_element(std::string_view tag, const Html& content,
 }
 
 Html html_paragraph(std::string_view text) { return html_element("p", with_code(text)); }
+
+const char* light_name(Light light) {
+  switch (light) {
+    case Light::none:
+      return "none";
+    case Light::good:
+      return "good";
+    case Light::warning:
+      return "warning";
+    case Light::bad:
+      return "bad";
+  }
+  return "none";
+}
 
 const char* light_words(Light light) {
   switch (light) {
@@ -110,6 +115,22 @@ HtmlCell number_cell(double value, int decimals) {
   return cell;
 }
 
+HtmlCell significant_cell(double value, int digits) {
+  if (!std::isfinite(value)) return {};
+  HtmlCell cell;
+  cell.text = significant_text(value, digits);
+  cell.sort_key = value;
+  return cell;
+}
+
+HtmlCell less_by_cell(double before, double after) {
+  if (!std::isfinite(after) || !(before > 0)) return {};
+  HtmlCell cell;
+  cell.text = less_by_text(before, after);
+  cell.sort_key = 1 - after / before;
+  return cell;
+}
+
 Html html_table(const HtmlTable& table) {
   std::string rows;
   for (std::size_t r = 0; r < table.rows.size(); ++r) {
@@ -123,10 +144,20 @@ Html html_table(const HtmlTable& table) {
   const std::string caption =
       table.caption.empty() ? "" : "<caption>" + markup_escaped(table.caption) + "</caption>";
   return {
-      fmt::format("<div class=\"scroll\" tabindex=\"0\" role=\"group\" "
+      fmt::format("<div class=\"scroll{}\" tabindex=\"0\" role=\"group\" "
                   "aria-label=\"{}\"><table{}>{}{}<tbody>\n{}</tbody></table></div>\n",
-                  markup_escaped(table.caption), table.sortable ? " class=\"sortable\"" : "", caption,
-                  table_head(table).source, rows)};
+                  table.rows.size() > kLongTable ? " tall" : "", markup_escaped(table.caption),
+                  table.sortable ? " class=\"sortable\"" : "", caption, table_head(table).source, rows)};
+}
+
+Html html_light(Light light, std::string_view words) {
+  return {light_mark(light).source + html_text(words).source};
+}
+
+Html html_folded(std::string_view title, const Html& content, bool open) {
+  const Html summary = html_element("summary", html_text(title));
+  return {fmt::format("<details{}>{}{}</details>\n", open ? " open=\"open\"" : "", summary.source,
+                      content.source)};
 }
 
 Html html_facts(const std::vector<std::pair<std::string, std::string>>& facts) {
@@ -161,7 +192,7 @@ Html html_verdict(const Verdict& verdict) {
   list("What was found", verdict.findings);
   list("What to do next", verdict.next_steps);
   return html_element("section", content,
-                      {{"class", fmt::format("verdict {}", light_class(verdict.light))}, {"id", "verdict"}});
+                      {{"class", fmt::format("verdict {}", light_name(verdict.light))}, {"id", "verdict"}});
 }
 
 std::string render_page(const HtmlPage& page) {

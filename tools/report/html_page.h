@@ -30,6 +30,8 @@ struct Html {
 /// A traffic light in shape and words as well as in colour.
 enum class Light { none, good, warning, bad };
 [[nodiscard]] const char* light_words(Light light);
+/// One word for machines: none, good, warning, bad.
+[[nodiscard]] const char* light_name(Light light);
 
 struct HtmlCell {
   std::string text;
@@ -44,6 +46,10 @@ struct HtmlCell {
 inline constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 /// A cell with a number shown to `decimals` places, sorted by its value; NaN is an empty cell.
 [[nodiscard]] HtmlCell number_cell(double value, int decimals);
+/// A number to so many significant digits, for columns whose rows differ by powers of ten.
+[[nodiscard]] HtmlCell significant_cell(double value, int digits);
+/// Per cent by which `after` is less than `before`, with as many nines as it takes to tell it from 100.
+[[nodiscard]] HtmlCell less_by_cell(double before, double after);
 
 struct HtmlTable {
   struct Column {
@@ -59,6 +65,12 @@ struct HtmlTable {
   std::size_t highlighted = SIZE_MAX;  ///< row drawn strong
 };
 [[nodiscard]] Html html_table(const HtmlTable& table);
+
+/// Words with a light before them.
+[[nodiscard]] Html html_light(Light light, std::string_view words);
+
+/// Content below a title that opens and closes it; on paper only what is open shows.
+[[nodiscard]] Html html_folded(std::string_view title, const Html& content, bool open);
 
 /// Terms with their values, for short lists of facts.
 [[nodiscard]] Html html_facts(const std::vector<std::pair<std::string, std::string>>& facts);

@@ -97,4 +97,27 @@ std::string significant_text(double value, int digits) {
   return with_true_minus(fmt::format("{:.{}f}", value, std::clamp(digits - 1 - exponent, 0, 9)));
 }
 
+std::string status_text(std::string_view status) {
+  std::string out(status);
+  std::replace(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(std::min(out.find(':'), out.size())),
+               '_', ' ');
+  return out;
+}
+
+std::string sentence(std::string words) {
+  if (words.empty()) return words;
+  const std::string first = words.substr(0, words.find(' '));
+  const bool is_word = std::all_of(first.begin(), first.end(), [](char c) { return c >= 'a' && c <= 'z'; });
+  if (is_word) words[0] = static_cast<char>(words[0] - 'a' + 'A');
+  if (std::string_view(".!?:").find(words.back()) == std::string_view::npos) words += '.';
+  return words;
+}
+
+std::string less_by_text(double before, double after) {
+  const double left = before > 0 ? 100 * after / before : 100;
+  const int decimals =
+      left > 0 && left < 0.95 ? std::min(6, static_cast<int>(std::ceil(-std::log10(left)))) + 1 : 1;
+  return number_text(100 - left, std::pow(10.0, -decimals));
+}
+
 }  // namespace hexcal

@@ -21,4 +21,14 @@ namespace hexcal {
 /// A number with `digits` significant digits in fixed notation, with a true minus sign.
 [[nodiscard]] std::string significant_text(double value, int digits);
 
+/// Words of a program as words of a person: "no_markers: none seen" is "no markers: none seen".
+[[nodiscard]] std::string status_text(std::string_view status);
+
+/// A sentence: begins with a capital, unless that would change a name, and ends with a full stop.
+[[nodiscard]] std::string sentence(std::string words);
+
+/// "99.5" for a fall from 200 to 1: per cent by which `after` is less than `before`, with as many digits as
+/// it takes to tell it from 100.
+[[nodiscard]] std::string less_by_text(double before, double after);
+
 }  // namespace hexcal

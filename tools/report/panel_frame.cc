@@ -55,6 +55,18 @@ DataRange data_range(const Panel& panel) {
   return range;
 }
 
+// Decades that hold all values above zero.
+AxisTicks decades_of(const Panel& panel) {
+  Range range;
+  for (const Series& series : panel.series) {
+    for (const double value : series.y) {
+      if (value > 0) range.add(std::log10(value));
+    }
+  }
+  const double low = std::isfinite(range.low) ? std::floor(range.low) : 0;
+  return {low, std::max(std::ceil(range.high), low + 1), 1};
+}
+
 AxisTicks ticks_of(const Axis& axis, const Range& data, int wanted, bool tight) {
   double low = axis.low.value_or(data.low);
   const double high = axis.high.value_or(data.high);
@@ -99,10 +111,10 @@ std::vector<std::vector<std::size_t>> legend_rows(const Panel& panel, double wid
 }  // namespace
 
 PanelFrame::PanelFrame(const Panel& panel, const Eigen::Vector2d& corner, const Eigen::Vector2d& size)
-    : corner_(corner), size_(size), y_down_(panel.photograph_frame) {
+    : corner_(corner), size_(size), y_down_(panel.photograph_frame), y_log_(panel.y.logarithmic) {
   const DataRange range = data_range(panel);
   x = ticks_of(panel.x, range.x, 6, !panel.x.categories.empty() || !panel.cells.empty());
-  y = ticks_of(panel.y, range.y, 5, !panel.cells.empty());
+  y = y_log_ ? decades_of(panel) : ticks_of(panel.y, range.y, 5, !panel.cells.empty());
   Range heat;
   for (const HeatCell& cell : panel.cells) heat.add(cell.value);
   heat_low = std::min(0.0, heat.low);
@@ -111,7 +123,7 @@ PanelFrame::PanelFrame(const Panel& panel, const Eigen::Vector2d& corner, const 
 
   double y_label_width = 0;
   for (const double value : y.values()) {
-    y_label_width = std::max(y_label_width, text_width(number_text(value, y.step), kLabelSize));
+    y_label_width = std::max(y_label_width, text_width(y_label(value), kLabelSize));
   }
   const double left = 13 + (panel.y.title.empty() ? 0 : 16) + y_label_width;
   const double right = panel.cells.empty() ? 18 : kHeatKeyWidth;
@@ -137,9 +149,14 @@ PanelFrame::PanelFrame(const Panel& panel, const Eigen::Vector2d& corner, const 
 
 Eigen::Vector2d PanelFrame::pixel(const Eigen::Vector2d& data) const {
   const double share_x = (data.x() - x.low) / (x.high - x.low);
-  const double share_y = (data.y() - y.low) / (y.high - y.low);
+  const double at_y = !y_log_ ? data.y() : data.y() > 0 ? std::max(std::log10(data.y()), y.low) : y.low;
+  const double share_y = (at_y - y.low) / (y.high - y.low);
   return plot_corner +
          Eigen::Vector2d(share_x * plot_size.x(), (y_down_ ? share_y : 1 - share_y) * plot_size.y());
+}
+
+std::string PanelFrame::y_label(double tick) const {
+  return y_log_ ? significant_text(std::pow(10.0, tick), 1) : number_text(tick, y.step);
 }
 
 void PanelFrame::draw(const Panel& panel, Canvas& canvas) const {
@@ -148,13 +165,12 @@ void PanelFrame::draw(const Panel& panel, Canvas& canvas) const {
   }
   draw_legend(panel, canvas);
   for (const double value : y.values()) {
-    const Eigen::Vector2d left = pixel({x.low, value});
-    const bool zero = std::abs(value) < 1e-6 * y.step;
+    const Eigen::Vector2d left = pixel({x.low, y_log_ ? std::pow(10.0, value) : value});
+    const bool zero = !y_log_ && std::abs(value) < 1e-6 * y.step;
     if (panel.cells.empty()) {
       canvas.line(left, left + Eigen::Vector2d(plot_size.x(), 0), {{zero ? Ink::muted : Ink::grid}, 1});
     }
-    canvas.text(left + Eigen::Vector2d(-6, 3.7), number_text(value, y.step),
-                {kLabelSize, Anchor::end, kMuted});
+    canvas.text(left + Eigen::Vector2d(-6, 3.7), y_label(value), {kLabelSize, Anchor::end, kMuted});
   }
   draw_x_labels(panel, canvas);
   const Eigen::Vector2d low = plot_corner + Eigen::Vector2d(0, plot_size.y());
@@ -202,7 +218,7 @@ void PanelFrame::draw_x_labels(const Panel& panel, Canvas& canvas) const {
   const double base = plot_corner.y() + plot_size.y();
   if (panel.x.categories.empty()) {
     for (const double value : x.values()) {
-      const double left = pixel({value, y.low}).x();
+      const double left = plot_corner.x() + (value - x.low) * pixels_per_unit_x();
       canvas.line({left, base}, {left, base + 4}, {kMuted, 1});
       canvas.text({left, base + 15}, number_text(value, x.step), {kLabelSize, Anchor::middle, kMuted});
     }
@@ -213,7 +229,7 @@ void PanelFrame::draw_x_labels(const Panel& panel, Canvas& canvas) const {
   const auto stride =
       static_cast<std::size_t>(std::max(1.0, std::ceil((turned_ ? kLabelSize + 1 : 0) / room)));
   for (std::size_t i = 0; i < panel.x.categories.size(); i += stride) {
-    const double left = pixel({static_cast<double>(i), y.low}).x();
+    const double left = plot_corner.x() + (static_cast<double>(i) - x.low) * pixels_per_unit_x();
     if (turned_) {
       canvas.text({left + 3.5, base + 6}, shortened(panel.x.categories[i]),
                   {kLabelSize, Anchor::end, kMuted, false, -90});

@@ -14,6 +14,8 @@ class PanelFrame {
   PanelFrame(const Panel& panel, const Eigen::Vector2d& corner, const Eigen::Vector2d& size);
 
   [[nodiscard]] Eigen::Vector2d pixel(const Eigen::Vector2d& data) const;
+  /// Label of a tick of y.
+  [[nodiscard]] std::string y_label(double tick) const;
   [[nodiscard]] double pixels_per_unit_x() const { return plot_size.x() / (x.high - x.low); }
 
   /// Title, legend, grid, ticks and labels, colour key.
@@ -33,6 +35,7 @@ class PanelFrame {
   double label_height_ = 0;  ///< of the x labels
   bool turned_ = false;      ///< x labels stand upright
   bool y_down_ = false;
+  bool y_log_ = false;  ///< y holds decades
 };
 
 /// Mark of a series in points and legends: each series has its own shape beside its own colour.

@@ -13,6 +13,9 @@ namespace {
 // The paper names the parameters x-tran .. z-rot; roll, pitch and yaw are its x-, y- and z-rot.
 constexpr std::array kParameters{"x-tran", "y-tran", "z-tran", "x-rot", "y-rot", "z-rot"};
 
+// Errors that fall by more than this factor vanish on a linear axis.
+constexpr double kLogarithmicFrom = 20;
+
 double unit(Eigen::Index i) { return i < 3 ? 1 : kDegPerRad; }
 
 Series series_of(const std::string& name, Series::Kind kind, int colour) {
@@ -194,19 +197,29 @@ Chart method_deviation_chart(const PaperData& data, std::size_t index) {
                             paper_number(method.name, "figure", 12, 2));
   chart.caption = kept_words(data, method);
   chart.panel_size = {440, 210};
+  const BeforeAfter statistics = statistics_of(data, method);
+  bool logarithmic = false;
   // Position down the left column, orientation down the right.
   for (const std::size_t k : {0U, 3U, 1U, 4U, 2U, 5U}) {
     Panel panel;
     panel.title = kParameters[k];
     panel.x.categories = data.pose_ids;
     panel.y.title = k < 3 ? "deviation (mm)" : "deviation (deg)";
-    panel.y.low = 0;
+
     panel.series = {series_of(data.before.name, Series::Kind::points, 0),
                     series_of(method.name, Series::Kind::points, 1)};
     panel.series[0].y = absolute_errors(data.before, static_cast<Eigen::Index>(k));
     panel.series[1].y = absolute_errors(method, static_cast<Eigen::Index>(k));
+    const Eigen::Index parameter = static_cast<Eigen::Index>(k);
+    panel.y.logarithmic =
+        statistics.before.rms[parameter] > kLogarithmicFrom * statistics.after.rms[parameter];
+    if (!panel.y.logarithmic) panel.y.low = 0;
+    logarithmic = logarithmic || panel.y.logarithmic;
     chart.panels.push_back(std::move(panel));
   }
+  if (logarithmic)
+    chart.caption +=
+        " Deviations that fell to less than a twentieth are on a logarithmic axis, to be seen at all.";
   return chart;
 }
 
@@ -254,6 +267,7 @@ Chart all_ranges_chart(const PaperData& data) {
 std::vector<Chart> paper_charts(const PaperData& data) {
   std::vector<Chart> charts{absolute_error_chart(data), uncalibrated_range_chart(data)};
   for (std::size_t i = 0; i < data.methods.size(); ++i) {
+    if (!data.methods[i].has_figures) continue;
     charts.push_back(method_range_chart(data, i));
     charts.push_back(method_deviation_chart(data, i));
   }
@@ -271,19 +285,18 @@ HtmlTable magnitude_table(const PaperData& data) {
       "keeps";
   table.columns = {{"method", "", false, ""},           {"poses", "", true, ""},
                    {"position before", "mm", true, ""}, {"after", "mm", true, ""},
-                   {"improvement", "%", true, ""},      {"orientation before", "deg", true, ""},
-                   {"after", "deg", true, ""},          {"improvement", "%", true, ""}};
+                   {"less by", "%", true, ""},          {"orientation before", "deg", true, ""},
+                   {"after", "deg", true, ""},          {"less by", "%", true, ""}};
   for (const MethodPoses& method : data.methods) {
     const BeforeAfter s = statistics_of(data, method);
     table.rows.push_back(
         {label_cell(method.name + paper_number(method.name, "table", 2, 1), method.note),
-         number_cell(s.after.poses, 0), number_cell(s.before.position_magnitude_mm, 4),
-         number_cell(s.after.position_magnitude_mm, 4),
-         number_cell(improvement_percent(s.before.position_magnitude_mm, s.after.position_magnitude_mm), 1),
-         number_cell(s.before.orientation_magnitude_rad * kDegPerRad, 4),
-         number_cell(s.after.orientation_magnitude_rad * kDegPerRad, 4),
-         number_cell(
-             improvement_percent(s.before.orientation_magnitude_rad, s.after.orientation_magnitude_rad), 1)});
+         number_cell(s.after.poses, 0), significant_cell(s.before.position_magnitude_mm, 4),
+         significant_cell(s.after.position_magnitude_mm, 4),
+         less_by_cell(s.before.position_magnitude_mm, s.after.position_magnitude_mm),
+         significant_cell(s.before.orientation_magnitude_rad * kDegPerRad, 4),
+         significant_cell(s.after.orientation_magnitude_rad * kDegPerRad, 4),
+         less_by_cell(s.before.orientation_magnitude_rad, s.after.orientation_magnitude_rad)});
   }
   return table;
 }
@@ -299,9 +312,9 @@ HtmlTable fair_table(const PaperData& data) {
                    {"position max", "mm", true, ""},
                    {"orientation rms", "deg", true, "of the angle of the rotation from target to actual"},
                    {"orientation max", "deg", true, ""},
-                   {"position better by", "%", true, ""},
-                   {"orientation better by", "%", true, ""},
-                   {"dropped poses", "", true, "measured, but not kept by this method"}};
+                   {"less by", "%", true, ""},
+                   {"less by", "%", true, ""},
+                   {"dropped", "poses", true, "measured, but not kept by this method"}};
   for (const MethodPoses* poses : all) {
     const ErrorStatistics s = error_statistics(kept(*poses, shared));
     const bool first = poses == all[0];
@@ -309,14 +322,13 @@ HtmlTable fair_table(const PaperData& data) {
     for (std::size_t i = 0; i < data.before.pairs.size(); ++i) {
       dropped += data.before.pairs[i].has_value() && !poses->pairs[i].has_value() ? 1 : 0;
     }
-    table.rows.push_back(
-        {label_cell(poses->name, poses->note), number_cell(s.position_rms_mm, 4),
-         number_cell(s.position_max_mm, 4), number_cell(s.orientation_rms_rad * kDegPerRad, 4),
-         number_cell(s.orientation_max_rad * kDegPerRad, 4),
-         number_cell(first ? kNoNumber : improvement_percent(before.position_rms_mm, s.position_rms_mm), 2),
-         number_cell(
-             first ? kNoNumber : improvement_percent(before.orientation_rms_rad, s.orientation_rms_rad), 2),
-         number_cell(dropped, 0)});
+    table.rows.push_back({label_cell(poses->name, poses->note), significant_cell(s.position_rms_mm, 4),
+                          significant_cell(s.position_max_mm, 4),
+                          significant_cell(s.orientation_rms_rad * kDegPerRad, 4),
+                          significant_cell(s.orientation_max_rad * kDegPerRad, 4),
+                          less_by_cell(first ? 0 : before.position_rms_mm, s.position_rms_mm),
+                          less_by_cell(first ? 0 : before.orientation_rms_rad, s.orientation_rms_rad),
+                          number_cell(dropped, 0)});
   }
   return table;
 }

@@ -16,6 +16,7 @@ struct MethodPoses {
   std::string name;  ///< "option1", "kinematic"
   std::string note;  ///< how the poses came about: "cross-validated", "measured again"
   std::vector<std::optional<PosePair>> pairs;  ///< per pose of the campaign, in its order
+  bool has_figures = true;  ///< figures of its own; else it stands in the tables and the figures of all
 };
 
 /// What the paper's figures 9 to 18 and tables 2 to 4 are drawn from (Karmakar and Turner, section 3).
@@ -38,7 +39,7 @@ struct PaperData {
 [[nodiscard]] Chart improvement_chart(const PaperData& data);
 /// Figure 18: error ranges before and after every method, over the poses that all keep.
 [[nodiscard]] Chart all_ranges_chart(const PaperData& data);
-/// All of them in the paper's order.
+/// All of them in the paper's order, 11 to 16 for the methods that have figures of their own.
 [[nodiscard]] std::vector<Chart> paper_charts(const PaperData& data);
 
 /// Tables 2 to 4 in one: eq. 7 magnitudes before and after each method and the improvement.

@@ -64,6 +64,10 @@ void PdfCanvas::polyline(std::span<const Eigen::Vector2d> points, const Stroke& 
   cairo_stroke(page_->context);
 }
 
+void PdfCanvas::polylines(std::span<const std::vector<Eigen::Vector2d>> lines, const Stroke& stroke) {
+  for (const std::vector<Eigen::Vector2d>& line : lines) polyline(line, stroke);
+}
+
 void PdfCanvas::polygon(std::span<const Eigen::Vector2d> points, const Paint& fill) {
   add_path(page_->context, points);
   cairo_close_path(page_->context);

@@ -55,6 +55,7 @@ Html poses_section(const CampaignReport& report) {
     cells[0].text = record.id;
     cells[1].text = judgements[row].words.empty() ? "good" : judgements[row].words;
     cells[1].light = judgements[row].light;
+    cells[1].hint = record.remarks;
     cells[1].sort_key = static_cast<double>(judgements[row].light);
     for (Eigen::Index i = 0; i < 6; ++i) cells.push_back(parameter_cell(record, i));
     if (!targets.empty()) {
@@ -65,8 +66,8 @@ Html poses_section(const CampaignReport& report) {
         const std::array pair{PosePair{target->second, *record.pose}};
         error = error_statistics(pair);
       }
-      cells.push_back(number_cell(both ? error.position_rms_mm : kNoNumber, 4));
-      cells.push_back(number_cell(both ? error.orientation_rms_rad * kDegPerRad : kNoNumber, 4));
+      cells.push_back(number_cell(both ? error.position_rms_mm : kNoNumber, 3));
+      cells.push_back(number_cell(both ? error.orientation_rms_rad * kDegPerRad : kNoNumber, 3));
     }
     cells.push_back(number_cell(record.images ? *record.images : kNoNumber, 0));
     cells.push_back(number_cell(record.markers ? *record.markers : kNoNumber, 0));
@@ -90,8 +91,8 @@ Html methods_section(const CampaignReport& report) {
             : fmt::format("Error that would remain after compensation; poses held out in {} parts",
                           calibration.comparison.folds);
     table.columns = {{"method", "", false, ""},
-                     {"position rms", "mm", true, ""},
-                     {"orientation rms", "deg", true, ""},
+                     {"position rms", "mm", true, "with its standard error"},
+                     {"orientation rms", "deg", true, "with its standard error"},
                      {"position max", "mm", true, ""},
                      {"orientation max", "deg", true, ""},
                      {"targets lost", "", true, "out of stroke after compensation"},
@@ -103,16 +104,16 @@ Html methods_section(const CampaignReport& report) {
       cells[0].text = method.name;
       cells[6].text = method.failure;
       if (!failed) {
-        const auto with_error = [](double value, double se, int decimals) {
-          HtmlCell cell = number_cell(value, decimals);
-          if (se > 0) cell.second = "\xC2\xB1" + number_text(se, std::pow(10.0, -decimals));
+        const auto with_error = [](double value, double se) {
+          HtmlCell cell = significant_cell(value, 3);
+          if (se > 0) cell.text += " \xC2\xB1 " + significant_text(se, 2);
           return cell;
         };
-        cells[1] = with_error(method.errors.position_rms_mm, method.position_rms_se_mm, 4);
+        cells[1] = with_error(method.errors.position_rms_mm, method.position_rms_se_mm);
         cells[2] = with_error(method.errors.orientation_rms_rad * kDegPerRad,
-                              method.orientation_rms_se_rad * kDegPerRad, 4);
-        cells[3] = number_cell(method.errors.position_max_mm, 4);
-        cells[4] = number_cell(method.errors.orientation_max_rad * kDegPerRad, 4);
+                              method.orientation_rms_se_rad * kDegPerRad);
+        cells[3] = significant_cell(method.errors.position_max_mm, 3);
+        cells[4] = significant_cell(method.errors.orientation_max_rad * kDegPerRad, 3);
         cells[5] = number_cell(method.targets_lost, 0);
       }
       if (method.name == calibration.chosen) table.highlighted = i;

@@ -11,8 +11,10 @@ namespace hexcal {
 [[nodiscard]] Html methods_section(const CampaignReport& report);
 [[nodiscard]] Html machine_section(const CompensationPart& part);
 [[nodiscard]] Html network_section(const NetworkPart& network);
+[[nodiscard]] Html photographs_section(const NetworkPart& network);
 [[nodiscard]] Html camera_section(const CameraPart& part);
 
+[[nodiscard]] bool has_residuals(const NetworkPart& network);
 /// Residual vectors of all photographs over the frame.
 [[nodiscard]] Chart residual_chart(const NetworkPart& network);
 /// Corrections of the machine leg by leg, with one-sigma bars.

@@ -98,6 +98,8 @@ Html html_scene(const Scene3d& scene) {
   }
   const Json data = {{"centre", json_of(bounds.centre)},
                      {"radius", std::round(bounds.radius * 1e3) / 1e3},
+                     {"far", std::round(bounds.far * 1e3) / 1e3},
+                     {"shown", first_shown_pose(scene)},
                      {"fixed",
                       {{"frames", json_list(scene.frames)},
                        {"markers", json_list(scene.markers)},
@@ -122,7 +124,7 @@ Html html_scene(const Scene3d& scene) {
   out +=
       html_element("p", html_text("This browser offers no WebGL; a still picture stands in for the 3D view."),
                    {{"id", "scene-note"}, {"hidden", "hidden"}});
-  out += html_element("div", {scene_still_svg(scene, 0)}, {{"class", "print-only"}, {"id", "scene-still"}});
+  out += html_element("div", {scene_still_svg(scene)}, {{"class", "print-only"}, {"id", "scene-still"}});
   std::string key =
       "Blue squares: fixed markers; green: moving markers; purple: camera stations; orange: legs 1 to 6";
   key += scene.ellipsoid_scale == 1

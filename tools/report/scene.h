@@ -61,7 +61,8 @@ struct Scene3d {
 /// must have `with_scene`.
 [[nodiscard]] Html html_scene(const Scene3d& scene);
 
-/// The still picture: pose `index` seen from the front, a little to the right and above.
-[[nodiscard]] std::string scene_svg_file(const Scene3d& scene, std::size_t index);
+/// The still picture: the pose shown first, seen from the front, a little to the right and above.
+[[nodiscard]] std::string scene_svg_file(const Scene3d& scene);
+[[nodiscard]] std::string scene_pdf_file(const Scene3d& scene);
 
 }  // namespace hexcal

@@ -30,9 +30,9 @@
   const camera = new THREE.PerspectiveCamera(35, 1, 1, 1e6);
   camera.up.set(0, 0, 1);
   const centre = vector(data.centre);
-  const home = {turn: -0.9, lift: 0.35, distance: data.radius * 3.4};
+  const home = {turn: -0.9, lift: 0.35, distance: Math.max(data.radius * 3.3, data.far * 2)};
   const view = {...home};
-  let pose = 0;
+  let pose = data.shown;
 
   function lines(points, name, opacity = 1) {
     const geometry = new THREE.BufferGeometry().setFromPoints(points);
@@ -45,6 +45,7 @@
     mesh.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), b.clone().sub(a).normalize());
     return mesh;
   }
+  // Labels keep their size on the screen, near or far: `size` is a share of the view's height.
   function label(words, at, name, size) {
     const picture = document.createElement("canvas");
     const pen = picture.getContext("2d");
@@ -57,7 +58,7 @@
     pen.fillText(words, 4, 40);
     const texture = new THREE.CanvasTexture(picture);
     texture.minFilter = THREE.LinearFilter;
-    const sprite = new THREE.Sprite(new THREE.SpriteMaterial({map: texture, depthTest: false}));
+    const sprite = new THREE.Sprite(new THREE.SpriteMaterial({map: texture, depthTest: false, sizeAttenuation: false}));
     sprite.scale.set(size * picture.width / picture.height, size, 1);
     sprite.position.copy(at);
     return sprite;
@@ -77,9 +78,11 @@
     ["x", "y", "z"].forEach((axis, i) => {
       const tip = origin.clone().addScaledVector(vector(item.axes[i]), data.radius * 0.16);
       group.add(rod(origin, tip, data.radius * 0.004, names[i]));
-      group.add(label(axis, tip, names[i], data.radius * 0.045));
+      group.add(label(axis, tip, names[i], 0.018));
     });
-    group.add(label(item.name, origin, "text", data.radius * 0.06));
+    const name = label(item.name, origin, "text", 0.024);
+    name.center.set(1.2, item.name === "LG" ? 1.3 : -0.3);  // the two grips lie close
+    group.add(name);
     return group;
   }
   function station(item) {
@@ -89,7 +92,9 @@
     const points = [];
     corners.forEach((corner, i) => points.push(apex, corner, corner, corners[(i + 1) % 4]));
     group.add(lines(points, "s6"));
-    group.add(label(item.name, apex, "muted", data.radius * 0.04));
+    const name = label(item.name, apex, "muted", 0.018);
+    name.center.set(0.5, -0.6);
+    group.add(name);
     return group;
   }
   function ellipsoid(item) {
@@ -123,7 +128,7 @@
       if (platform.length) root.add(lines(ring(platform), "muted"));
       platform.forEach((joint, i) => {
         root.add(rod(body[i], joint, data.radius * 0.008, "s4"));
-        root.add(label(String(i + 1), body[i].clone().lerp(joint, 0.5), "text", data.radius * 0.045));
+        root.add(label(String(i + 1), body[i].clone().lerp(joint, 0.5), "text", 0.02));
       });
     }
     draw();
@@ -188,6 +193,7 @@
   const buttons = {"scene-left": () => turn(0.25, 0), "scene-right": () => turn(-0.25, 0), "scene-in": () => zoom(0.8), "scene-out": () => zoom(1.25), "scene-reset": reset};
   for (const [id, action] of Object.entries(buttons)) document.getElementById(id).addEventListener("click", action);
   const select = document.getElementById("scene-pose");
+  select.value = String(pose);
   select.addEventListener("change", () => { pose = Number(select.value); rebuild(); });
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", rebuild);
   new ResizeObserver(draw).observe(host);

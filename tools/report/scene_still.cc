@@ -1,10 +1,13 @@
 #include "tools/report/scene_still.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
+#include "tools/report/pdf_canvas.h"
 #include "tools/report/svg_canvas.h"
 
 namespace hexcal {
@@ -14,6 +17,9 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 const Vector2d kStillSize(760, 560);
+// Cameras farther off than so many radii are not brought into view.
+constexpr double kFarthest = 2.2;
+constexpr const char* kStillTitle = "Cameras, markers, grip frames and legs";
 
 // The still shows the cameras too, so it fits its scale to everything it draws.
 class StillView {
@@ -94,6 +100,26 @@ void draw_markers(const StillView& view, const std::vector<SceneMarker>& markers
   }
 }
 
+// Outline of the projected ellipsoid: the points of the unit sphere's shadow that lie farthest out.
+void draw_ellipsoid(const StillView& view, const SceneEllipsoid& ellipsoid, double enlarged, Canvas& canvas) {
+  const Vector2d centre = view.pixel(ellipsoid.centre_mm);
+  Eigen::Matrix<double, 2, 3> axes;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const Vector3d tip = ellipsoid.centre_mm + enlarged * ellipsoid.half_axes_mm.col(i);
+    axes.col(i) = view.pixel(tip) - centre;
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix<double, 2, 3>> svd(axes, Eigen::ComputeFullU);
+  constexpr int kCorners = 32;
+  std::vector<Vector2d> outline;
+  for (int i = 0; i <= kCorners; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kCorners;
+    const Vector2d circle(std::cos(angle), std::sin(angle));
+    outline.push_back(centre + svd.matrixU() * svd.singularValues().cwiseProduct(circle));
+  }
+  canvas.polygon(outline, {Ink::series1, 0.35});
+  canvas.polyline(outline, {{Ink::series1}, 0.8});
+}
+
 void draw_pose(const StillView& view, const Scene3d& scene, const ScenePose& pose, double depth,
                Canvas& canvas) {
   for (const SceneCamera& camera : pose.cameras) {
@@ -112,6 +138,8 @@ void draw_pose(const StillView& view, const Scene3d& scene, const ScenePose& pos
   }
   canvas.polyline(outline(view, pose.platform_joints_mm), {{Ink::muted}, 1});
   draw_markers(view, pose.markers, Ink::series2, canvas);
+  for (const SceneEllipsoid& ellipsoid : pose.ellipsoids)
+    draw_ellipsoid(view, ellipsoid, scene.ellipsoid_scale, canvas);
   for (const SceneFrame& frame : pose.frames) draw_frame(view, frame, canvas);
 }
 
@@ -131,7 +159,19 @@ SceneBounds scene_bounds(const Scene3d& scene) {
     add_all(pose.platform_joints_mm);
   }
   if (box.isEmpty()) return {};
-  return {box.center(), std::max(0.5 * box.diagonal().norm(), 1e-3)};
+  SceneBounds bounds{box.center(), std::max(0.5 * box.diagonal().norm(), 1e-3), 0};
+  for (const ScenePose& pose : scene.poses) {
+    for (const SceneCamera& camera : pose.cameras)
+      bounds.far = std::max(bounds.far, (camera.scene_from_camera.translation - bounds.centre).norm());
+  }
+  bounds.far = std::min(bounds.far, kFarthest * bounds.radius);
+  return bounds;
+}
+
+std::size_t first_shown_pose(const Scene3d& scene) {
+  const auto found =
+      std::ranges::find_if(scene.poses, [](const ScenePose& pose) { return !pose.ellipsoids.empty(); });
+  return found == scene.poses.end() ? 0 : static_cast<std::size_t>(found - scene.poses.begin());
 }
 
 double frustum_depth(const SceneBounds& bounds) { return 0.22 * bounds.radius; }
@@ -154,16 +194,22 @@ void draw_scene_still(const Scene3d& scene, std::size_t index, const Vector2d& s
   if (pose != nullptr) draw_pose(view, scene, *pose, depth, canvas);
 }
 
-std::string scene_still_svg(const Scene3d& scene, std::size_t index) {
+std::string scene_still_svg(const Scene3d& scene) {
   SvgCanvas canvas;
-  draw_scene_still(scene, index, kStillSize, canvas);
-  return canvas.inline_svg(kStillSize, "Cameras, markers, grip frames and legs");
+  draw_scene_still(scene, first_shown_pose(scene), kStillSize, canvas);
+  return canvas.inline_svg(kStillSize, kStillTitle);
 }
 
-std::string scene_svg_file(const Scene3d& scene, std::size_t index) {
+std::string scene_pdf_file(const Scene3d& scene) {
+  PdfCanvas canvas(kStillSize, kStillTitle);
+  draw_scene_still(scene, first_shown_pose(scene), kStillSize, canvas);
+  return canvas.finish();
+}
+
+std::string scene_svg_file(const Scene3d& scene) {
   SvgCanvas canvas;
-  draw_scene_still(scene, index, kStillSize, canvas);
-  return canvas.svg_file(kStillSize, "Cameras, markers, grip frames and legs");
+  draw_scene_still(scene, first_shown_pose(scene), kStillSize, canvas);
+  return canvas.svg_file(kStillSize, kStillTitle);
 }
 
 }  // namespace hexcal

@@ -12,8 +12,12 @@ namespace hexcal {
 struct SceneBounds {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double radius = 1;
+  double far = 1;  ///< from the centre to the farthest camera, at most kFarthest radii
 };
 [[nodiscard]] SceneBounds scene_bounds(const Scene3d& scene);
+
+/// The pose shown first: one that has an error of its own, where there is one.
+[[nodiscard]] std::size_t first_shown_pose(const Scene3d& scene);
 
 /// How deep camera pyramids are drawn, mm.
 [[nodiscard]] double frustum_depth(const SceneBounds& bounds);
@@ -21,6 +25,6 @@ struct SceneBounds {
 
 /// Parallel projection of pose `index` from the front, turned to the right and seen from above.
 void draw_scene_still(const Scene3d& scene, std::size_t index, const Eigen::Vector2d& size, Canvas& canvas);
-[[nodiscard]] std::string scene_still_svg(const Scene3d& scene, std::size_t index);
+[[nodiscard]] std::string scene_still_svg(const Scene3d& scene);
 
 }  // namespace hexcal

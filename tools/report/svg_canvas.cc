@@ -35,6 +35,8 @@ std::string paint_attributes(const Paint& paint, bool stroke) {
   return out;
 }
 
+const char* dashes(const Stroke& stroke) { return stroke.dashed ? R"( stroke-dasharray="4 3")" : ""; }
+
 std::string opening(const Eigen::Vector2d& size, std::string_view title, std::string_view attributes) {
   return fmt::format(
       R"(<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {0} {1}" role="img" aria-label="{2}"{3}>)"
@@ -48,7 +50,31 @@ void SvgCanvas::polyline(std::span<const Eigen::Vector2d> points, const Stroke& 
   elements_ += fmt::format(R"(<polyline points="{}" fill="none"{} stroke-width="{}"{}/>)"
                            "\n",
                            point_list(points), paint_attributes(stroke.paint, true),
-                           short_number(stroke.width), stroke.dashed ? R"( stroke-dasharray="4 3")" : "");
+                           short_number(stroke.width), dashes(stroke));
+}
+
+void SvgCanvas::polylines(std::span<const std::vector<Eigen::Vector2d>> lines, const Stroke& stroke) {
+  if (lines.empty()) return;
+  std::string path;
+  for (const std::vector<Eigen::Vector2d>& line : lines) {
+    Eigen::Vector2d last = Eigen::Vector2d::Zero();
+    for (std::size_t i = 0; i < line.size(); ++i) {
+      // Steps from where the rounded path stands, so that roundings do not add up.
+      const Eigen::Vector2d step = i == 0 ? line[i] : Eigen::Vector2d(line[i] - last);
+      const Eigen::Vector2d rounded = (step * 100).array().round().matrix() / 100;
+      last = i == 0 ? rounded : Eigen::Vector2d(last + rounded);
+      const std::string y = short_number(step.y());
+      path += fmt::format("{}{}{}{}",
+                          i == 0   ? "M"
+                          : i == 1 ? "l"
+                                   : " ",
+                          short_number(step.x()), y.front() == '-' ? "" : " ", y);
+    }
+  }
+  elements_ +=
+      fmt::format(R"(<path d="{}" fill="none"{} stroke-width="{}"{}/>)"
+                  "\n",
+                  path, paint_attributes(stroke.paint, true), short_number(stroke.width), dashes(stroke));
 }
 
 void SvgCanvas::polygon(std::span<const Eigen::Vector2d> points, const Paint& fill) {

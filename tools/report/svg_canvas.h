@@ -10,6 +10,7 @@ namespace hexcal {
 class SvgCanvas final : public Canvas {
  public:
   void polyline(std::span<const Eigen::Vector2d> points, const Stroke& stroke) override;
+  void polylines(std::span<const std::vector<Eigen::Vector2d>> lines, const Stroke& stroke) override;
   void polygon(std::span<const Eigen::Vector2d> points, const Paint& fill) override;
   void rectangle(const Eigen::Vector2d& corner, const Eigen::Vector2d& size, const Paint& fill) override;
   void circle(const Eigen::Vector2d& centre, double radius, const Paint& fill) override;

@@ -1,0 +1,132 @@
+#include "tools/hexcal/report_input.h"
+
+#include <fmt/format.h>
+
+#include <map>
+
+#include "kinematics/geometry/input_error.h"
+#include "tools/hexcal/network_part.h"
+#include "tools/hexcal/version.h"
+#include "tools/io/atomic_file.h"
+#include "tools/io/camera_file.h"
+#include "tools/io/campaign_file.h"
+#include "tools/io/hexapod_file.h"
+#include "tools/io/observation_table.h"
+
+namespace hexcal {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string folder_name(const fs::path& folder) {
+  const fs::path absolute = fs::absolute(folder).lexically_normal();
+  return (absolute.has_filename() ? absolute : absolute.parent_path()).filename().string();
+}
+
+// The first comment of a result names the command that made it, with hashes of what it read.
+std::string maker_of(const fs::path& result) {
+  const std::string text = read_file(result);
+  const std::string line = text.substr(0, text.find('\n'));
+  return line.starts_with("# ") ? line.substr(2) : "";
+}
+
+void add_compensation(const Campaign& campaign, const std::string& method, CampaignReport& report,
+                      std::vector<fs::path>& inputs) {
+  const fs::path results = campaign.folder / "results";
+  if (!campaign.hexapod) {
+    report.no_compensation =
+        "Name the `hexapod` in campaign.yaml and run `hexcal compensate`: nothing is known of the machine "
+        "yet.";
+    return;
+  }
+  if (!campaign.targets && !campaign.legs) {
+    report.no_compensation = "Name `targets` or `legs` in campaign.yaml and run `hexcal compensate`.";
+    return;
+  }
+  ObservationFiles files;
+  files.poses = results / "poses.csv";
+  files.targets = campaign.targets;
+  files.legs = campaign.legs;
+  if (fs::exists(results / "poses_covariance.csv")) files.covariance = results / "poses_covariance.csv";
+  inputs.push_back(*campaign.hexapod);
+  if (files.legs) inputs.push_back(*files.legs);
+  try {
+    CompensationPart part;
+    part.nominal = read_hexapod_file(*campaign.hexapod);
+    part.observations = read_observations(part.nominal, files).observations;
+    CalibrateOptions options;
+    options.method = method;
+    part.calibration = calibrate(part.nominal, part.observations, options);
+    report.compensation = std::move(part);
+  } catch (const InputError& error) {
+    // The measurement is worth a report even where nothing can be identified from it.
+    report.no_compensation = fmt::format("No compensation: {}.", error.what());
+  }
+  if (fs::exists(results / "actuators.csv")) {
+    inputs.push_back(results / "actuators.csv");
+    report.commands = read_leg_table(results / "actuators.csv");
+  }
+}
+
+// Where the machine was identified its observations hold whole covariances, else there are only sigmas.
+std::map<std::string, Matrix6d> pose_covariances(const CampaignReport& report) {
+  std::map<std::string, Matrix6d> out;
+  for (const PoseRecord& record : report.poses) {
+    if (record.sigma) out[record.id] = record.sigma->cwiseAbs2().asDiagonal();
+  }
+  if (!report.compensation) return out;
+  const ObservationSet& observations = report.compensation->observations;
+  for (std::size_t i = 0; i < observations.poses.size(); ++i)
+    out[observations.poses[i].id] = observations.covariance(i);
+  return out;
+}
+
+void add_network(const Campaign& campaign, CampaignReport& report) {
+  const fs::path results = campaign.folder / "results";
+  for (const char* file : {"photos.csv", "markers.csv", "residuals.csv", "quality.json"}) {
+    if (fs::exists(results / file)) continue;
+    report.no_network = fmt::format(
+        "There is no `results/{}`: run `hexcal measure` again to see photographs, residuals and the 3D view.",
+        file);
+    return;
+  }
+  const PlatformGeometry* machine = report.compensation ? &report.compensation->nominal : nullptr;
+  report.network = read_network_part(campaign, report, pose_covariances(report), machine);
+  add_thumbnails(campaign.images, *report.network);
+}
+
+}  // namespace
+
+fs::path campaign_folder(const fs::path& campaign) {
+  return fs::is_directory(campaign) ? campaign : campaign.parent_path();
+}
+
+CampaignReport read_campaign_report(const fs::path& path, const std::string& method) {
+  const Campaign campaign = read_campaign(path);
+  const fs::path results = campaign.folder / "results";
+  CampaignReport report;
+  report.name = folder_name(campaign.folder);
+  std::vector<fs::path> inputs{campaign.file};
+  if (campaign.targets) {
+    inputs.push_back(*campaign.targets);
+    report.targets = read_pose_table(*campaign.targets);
+  }
+  for (const CampaignCamera& camera : campaign.cameras) {
+    if (!fs::exists(camera.file)) continue;
+    inputs.push_back(camera.file);
+    report.cameras.push_back({camera.file.filename().string(), read_camera_file(camera.file)});
+  }
+  report.provenance = {{"program", fmt::format("hexcal {}", kVersion)}, {"command", "hexcal report"}};
+  if (fs::exists(results / "poses.csv")) {
+    inputs.push_back(results / "poses.csv");
+    report.poses = read_pose_table(results / "poses.csv");
+    add_compensation(campaign, method, report, inputs);
+    add_network(campaign, report);
+    report.provenance.emplace_back("poses.csv was made by", maker_of(results / "poses.csv"));
+  }
+  for (const fs::path& input : inputs)
+    report.provenance.emplace_back(input.filename().string(), "sha256 " + sha256_hex(read_file(input)));
+  return report;
+}
+
+}  // namespace hexcal
