@@ -68,7 +68,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         clone = pathlib.Path(folder) / "hexcal"
         subprocess.run(["git", "clone", "-q", "--shared", options.source, clone], check=True)
-        environment = dict(os.environ, PYTHON=options.python)
+        environment = dict(os.environ, PYTHON=options.python, HOME=folder)
         if options.build:
             build = pathlib.Path(options.build).resolve()
             environment["HEXCAL"] = str(build / "hexcal")

@@ -35,6 +35,7 @@ struct DetectFlags {
   std::string family = "tag36h11";
   std::vector<int> ids;
   fs::path camera;
+  fs::path relative_to;
   fs::path output;
   bool json = false;
 };
@@ -49,21 +50,31 @@ bool is_photograph(const fs::path& path) {
 
 struct Source {
   fs::path path;
-  std::string name;  // as written: relative to the folder that was given
+  std::string name;  // as written
 };
 
-std::vector<Source> list_photographs(const std::vector<fs::path>& inputs) {
+// Names are relative to `base`, or, without one, to the folder that was given.
+std::vector<Source> list_photographs(const std::vector<fs::path>& inputs, const fs::path& base) {
+  const auto name_of = [&base](const fs::path& file, const fs::path& folder) {
+    const fs::path from = base.empty() ? folder : base;
+    const fs::path name =
+        fs::absolute(file).lexically_normal().lexically_relative(fs::absolute(from / "").lexically_normal());
+    if (name.empty() || *name.begin() == "..")
+      throw InputError(
+          fmt::format("--relative-to: found {}, wanted a folder above {}", from.string(), file.string()));
+    return name.generic_string();
+  };
   std::vector<Source> sources;
   for (const fs::path& input : inputs) {
     if (!fs::is_directory(input)) {
       if (!fs::exists(input)) throw InputError(fmt::format("{}: no such file", input.string()));
-      sources.push_back({input, input.filename().string()});
+      sources.push_back({input, base.empty() ? input.filename().string() : name_of(input, {})});
       continue;
     }
     std::vector<Source> found;
     for (const auto& entry : fs::recursive_directory_iterator(input)) {
       if (entry.is_regular_file() && is_photograph(entry.path())) {
-        found.push_back({entry.path(), entry.path().lexically_relative(input).generic_string()});
+        found.push_back({entry.path(), name_of(entry.path(), input)});
       }
     }
     std::sort(found.begin(), found.end(), [](const Source& a, const Source& b) { return a.name < b.name; });
@@ -93,7 +104,7 @@ int count_ok(const PhotographObservations& photograph) {
 
 int run_detect(const DetectFlags& flags) {
   const MarkerFamily& family = marker_family(flags.family);
-  const std::vector<Source> sources = list_photographs(flags.images);
+  const std::vector<Source> sources = list_photographs(flags.images, flags.relative_to);
   std::optional<CalibratedCamera> camera;
   DetectionSet set{flags.family, {}, {}};
   if (!flags.camera.empty()) {
@@ -154,6 +165,9 @@ void add_detect_command(CLI::App& app, Action& action) {
       ->capture_default_str();
   command->add_option("--ids", flags->ids, "look for these ids only")->delimiter(',');
   command->add_option("--camera", flags->camera, "camera.yaml whose lens stands inside the measurement");
+  command->add_option("--relative-to", flags->relative_to,
+                      "write names relative to this folder: with the campaign's folder of photographs, as "
+                      "measure --observations wants them");
   command->add_option("-o,--output", flags->output, "file of observations to write")->required();
   command->add_flag("--json", flags->json, "print the summary as JSON");
   command->callback([&action, flags] { action = [flags] { return run_detect(*flags); }; });

@@ -1,0 +1,35 @@
+# Third-party packages, each linked only by the module that needs it; why each is there: SUPPLY_CHAIN.md. What is missing
+# is named with its Debian package.
+macro(hexcal_find package debian)
+  find_package(${package} ${ARGN} QUIET)
+  if(NOT ${package}_FOUND)
+    message(FATAL_ERROR "hexcal needs ${package} (${ARGN}), which was not found. On Debian 12: apt-get install ${debian}, "
+                        "or everything at once: tools/dev/setup.sh")
+  endif()
+endmacro()
+# Packages that come with pkg-config files, as the target PkgConfig::NAME.
+macro(hexcal_find_pc name debian)
+  pkg_check_modules(${name} QUIET IMPORTED_TARGET ${ARGN})
+  if(NOT ${name}_FOUND)
+    message(FATAL_ERROR "hexcal needs ${ARGN}, which pkg-config does not find. On Debian 12: apt-get install ${debian}, "
+                        "or everything at once: tools/dev/setup.sh")
+  endif()
+endmacro()
+
+hexcal_find(Threads libc6-dev)
+hexcal_find(Eigen3 libeigen3-dev 3.4 NO_MODULE)
+hexcal_find(Ceres libceres-dev 2.1)
+hexcal_find(OpenCV libopencv-dev 4.5 COMPONENTS core imgproc imgcodecs calib3d aruco)
+hexcal_find(fmt libfmt-dev)
+hexcal_find(CLI11 libcli11-dev)
+hexcal_find(yaml-cpp libyaml-cpp-dev)
+hexcal_find(nlohmann_json nlohmann-json3-dev)
+hexcal_find(TBB libtbb-dev)
+hexcal_find(JPEG libjpeg-dev)
+hexcal_find(OpenSSL libssl-dev COMPONENTS Crypto)
+hexcal_find(PkgConfig pkg-config)
+hexcal_find_pc(APRILTAG libapriltag-dev apriltag)
+hexcal_find_pc(EXIV2 libexiv2-dev exiv2)
+hexcal_find_pc(LIBRAW libraw-dev libraw)
+hexcal_find_pc(CAIRO libcairo2-dev cairo)
+hexcal_find_pc(PCL libpcl-dev pcl_sample_consensus)
