@@ -100,7 +100,7 @@ HtmlPage campaign_page(const CampaignReport& report) {
                              report.cameras.size() > 1 ? fmt::format("Camera {}", i + 1) : "Camera",
                              camera_section(report.cameras[i])});
   }
-  page.sections.push_back({"provenance", "Provenance", html_facts(report.provenance)});
+  page.sections.push_back({"provenance", "Provenance", html_provenance(report.provenance)});
   return page;
 }
 

@@ -61,7 +61,8 @@ void draw_bars(const Panel& panel, const PanelFrame& frame, Canvas& canvas) {
       if (!series.sigma.empty() && series.sigma[i] > 0) {
         draw_sigma(frame, left + width / 2, series.y[i], series.sigma[i], Ink::text, canvas);
       }
-      const std::string label = significant_text(series.y[i], 2);
+      std::string label = significant_text(series.y[i], 3);
+      if (text_width(label, 8.5) > bar_px + 2) label = significant_text(series.y[i], 2);
       if (panel.value_labels && text_width(label, 8.5) <= bar_px + 2) {
         canvas.text({(top.x() + bottom.x()) / 2, series.y[i] < 0 ? bottom.y() + 9 : top.y() - 3}, label,
                     {8.5, Anchor::middle, {Ink::muted}});

@@ -16,8 +16,8 @@ namespace hexcal {
 namespace {
 
 constexpr std::array kParameterNames{"x", "y", "z", "roll", "pitch", "yaw"};
-// A pose counts as worse only beyond this many standard deviations of the difference.
-constexpr double kClearlyWorse = 3;
+// A pose counts as better or worse only beyond this many standard deviations of the difference.
+constexpr double kClearly = 3;
 
 // Poses with a value before and after, and what compensation promised for them where it did.
 struct SharedErrors {
@@ -35,7 +35,9 @@ SharedErrors shared_errors(const PaperData& data) {
   const MethodPoses* promise = promise_of(data);
   for (std::size_t i = 0; i < data.pose_ids.size(); ++i) {
     const auto& after = data.methods.back().pairs[i];
-    if (!data.before.pairs[i] || !after) continue;
+    // The home that defines a frame is zero by definition in both and says nothing.
+    const bool defines = data.sigma[i] && !(data.sigma[i]->norm() > 0);
+    if (!data.before.pairs[i] || !after || defines) continue;
     out.index.push_back(i);
     out.before.push_back(*data.before.pairs[i]);
     out.after.push_back(*after);
@@ -53,14 +55,18 @@ double typical_sigma(const CampaignReport& report, bool position) {
     if (!record.sigma || !(record.sigma->norm() > 0)) continue;
     values.push_back(position ? record.sigma->head<3>().norm() : record.sigma->tail<3>().norm() * kDegPerRad);
   }
-  return median(std::move(values));
+  return values.empty() ? kNoNumber : median(std::move(values));
 }
 
 struct PoseChange {
   ErrorStatistics before, after;
   double sigma_mm = 0, sigma_deg = 0;  ///< of the difference, from both rounds
-  Light light = Light::good;
+  Light light = Light::none;
 };
+
+const char* change_words(Light light) {
+  return light == Light::good ? "better" : light == Light::warning ? "worse" : "the same within noise";
+}
 
 std::optional<Vector6d> sigma_of(const CampaignReport& report, const std::string& id) {
   const auto found = std::ranges::find(report.poses, id, &PoseRecord::id);
@@ -80,8 +86,11 @@ PoseChange pose_change(const ComparisonReport& report, const std::string& id, co
   const double worse_mm = change.after.position_rms_mm - change.before.position_rms_mm;
   const double worse_deg =
       (change.after.orientation_rms_rad - change.before.orientation_rms_rad) * kDegPerRad;
-  if (worse_mm > kClearlyWorse * change.sigma_mm || worse_deg > kClearlyWorse * change.sigma_deg)
+  if (worse_mm > kClearly * change.sigma_mm || worse_deg > kClearly * change.sigma_deg) {
     change.light = Light::warning;
+  } else if (worse_mm < -kClearly * change.sigma_mm || worse_deg < -kClearly * change.sigma_deg) {
+    change.light = Light::good;
+  }
   return change;
 }
 
@@ -172,7 +181,7 @@ Html error_tables(const ComparisonReport& report, const PaperData& data, const S
     const std::string& id = data.pose_ids[shared.index[k]];
     const PoseChange change = pose_change(report, id, shared.before[k], shared.after[k]);
     poses.rows.push_back(
-        {text_cell(id), text_cell(change.light == Light::good ? "not worse" : "worse", change.light),
+        {text_cell(id), text_cell(change_words(change.light), change.light),
          number_cell(change.before.position_rms_mm, 4), number_cell(change.after.position_rms_mm, 4),
          number_cell(change.sigma_mm, 4), number_cell(change.before.orientation_rms_rad * kDegPerRad, 5),
          number_cell(change.after.orientation_rms_rad * kDegPerRad, 5), number_cell(change.sigma_deg, 5)});
@@ -290,6 +299,12 @@ Verdict comparison_verdict(const ComparisonReport& report) {
     verdict.light = Light::bad;
     verdict.headline =
         fmt::format("{} and {} share no measured pose with a target.", report.before.name, report.after.name);
+    for (const CampaignReport* round : {&report.before, &report.after}) {
+      if (!round->poses.empty()) continue;
+      verdict.headline = fmt::format("Nothing has been measured in {} yet.", round->name);
+      verdict.next_steps = {fmt::format("Run `hexcal measure` on {}.", round->name)};
+      return verdict;
+    }
     verdict.next_steps = {
         "Give the same poses the same names in both targets.csv and measure both campaigns."};
     return verdict;
@@ -314,9 +329,9 @@ HtmlPage comparison_page(const ComparisonReport& report) {
   }
   page.sections.push_back({"measurement", "The two measurements", measurement_table(report)});
   Html provenance = html_element("h3", html_text("Before: " + report.before.name));
-  provenance += html_facts(report.before.provenance);
+  provenance += html_provenance(report.before.provenance);
   provenance += html_element("h3", html_text("After: " + report.after.name));
-  provenance += html_facts(report.after.provenance);
+  provenance += html_provenance(report.after.provenance);
   page.sections.push_back({"provenance", "Provenance", provenance});
   return page;
 }
@@ -326,8 +341,12 @@ std::vector<Chart> comparison_charts(const ComparisonReport& report) {
   if (shared_errors(data).index.empty()) return {};
   const std::size_t after = data.methods.size() - 1;
   std::vector<Chart> charts{method_deviation_chart(data, after), all_ranges_chart(data)};
+  charts[0].title = "Absolute deviations per pose before and after";
   charts[1].title = "Error ranges before and after";
-  if (promise_of(data) != nullptr) charts.push_back(method_deviation_chart(data, 0));
+  if (promise_of(data) != nullptr) {
+    charts.push_back(method_deviation_chart(data, 0));
+    charts.back().title = "Absolute deviations per pose before and as promised";
+  }
   for (Chart& chart : charts) chart.id = "comparison_" + chart.id;
   return charts;
 }

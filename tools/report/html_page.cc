@@ -169,6 +169,16 @@ Html html_facts(const std::vector<std::pair<std::string, std::string>>& facts) {
   return html_element("dl", out, {{"class", "facts"}});
 }
 
+Html html_provenance(const std::vector<std::pair<std::string, std::string>>& facts) {
+  Html rows;
+  for (const auto& [term, value] : facts) {
+    const Html head = html_element("th", html_text(term), {{"scope", "row"}, {"class", "words"}});
+    const Html cell = html_element("td", html_element("code", html_text(value)), {{"class", "words long"}});
+    rows += html_element("tr", {head.source + cell.source});
+  }
+  return html_element("table", html_element("tbody", rows), {{"class", "provenance"}});
+}
+
 Html html_figure(const Chart& chart) {
   Html content = html_element("h3", html_text(chart.title));
   content += Html{chart_inline_svg(chart)};

@@ -75,6 +75,9 @@ struct HtmlTable {
 /// Terms with their values, for short lists of facts.
 [[nodiscard]] Html html_facts(const std::vector<std::pair<std::string, std::string>>& facts);
 
+/// Versions, commands and hashes, one a line.
+[[nodiscard]] Html html_provenance(const std::vector<std::pair<std::string, std::string>>& facts);
+
 /// A chart with its title and caption.
 [[nodiscard]] Html html_figure(const Chart& chart);
 

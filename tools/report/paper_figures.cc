@@ -213,7 +213,12 @@ Chart method_deviation_chart(const PaperData& data, std::size_t index) {
     const Eigen::Index parameter = static_cast<Eigen::Index>(k);
     panel.y.logarithmic =
         statistics.before.rms[parameter] > kLogarithmicFrom * statistics.after.rms[parameter];
-    if (!panel.y.logarithmic) panel.y.low = 0;
+    if (panel.y.logarithmic) {
+      // A pose without an error, such as the home that defines LG, has no place on such an axis.
+      for (Series& series : panel.series) std::ranges::replace(series.y, 0.0, kNoNumber);
+    } else {
+      panel.y.low = 0;
+    }
     logarithmic = logarithmic || panel.y.logarithmic;
     chart.panels.push_back(std::move(panel));
   }
