@@ -3,6 +3,7 @@
 
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "kinematics/geometry/input_error.h"
@@ -17,15 +18,19 @@ namespace hexcal {
 namespace {
 
 // Problems found on the way; a file that cannot be read at all ends the command through InputError instead.
+// What was found, for people as it comes or for machines at the end.
 class Findings {
  public:
-  void good(const std::string& line) { fmt::print("{} {}\n", coloured("ok  ", Colour::good), line); }
+  explicit Findings(bool as_json) : as_json_(as_json) {}
+
+  void good(const std::string& line) { add("ok", "ok  ", Colour::good, line); }
+  void warn(const std::string& line) { add("warning", "warn", Colour::warning, line); }
   void bad(const std::string& line) {
-    fmt::print("{} {}\n", coloured("BAD ", Colour::bad), line);
+    add("problem", "BAD ", Colour::bad, line);
     ++bad_;
   }
-  void warn(const std::string& line) { fmt::print("{} {}\n", coloured("warn", Colour::warning), line); }
   [[nodiscard]] int count() const { return bad_; }
+  [[nodiscard]] const nlohmann::ordered_json& json() const { return json_; }
 
   // Runs a reader whose failure is one finding among others.
   template <class Reader>
@@ -38,6 +43,13 @@ class Findings {
   }
 
  private:
+  void add(const char* severity, const char* mark, Colour colour, const std::string& line) {
+    json_.push_back({{"severity", severity}, {"words", line}});
+    if (!as_json_) fmt::print("{} {}\n", coloured(mark, colour), line);
+  }
+
+  bool as_json_;
+  nlohmann::ordered_json json_ = nlohmann::ordered_json::array();
   int bad_ = 0;
 };
 
@@ -82,10 +94,10 @@ void check_targets(const OpenCampaign& open, const std::filesystem::path& path, 
   });
 }
 
-int check(const MeasureRequest& request) {
+int check(const MeasureRequest& request, bool as_json) {
   const OpenCampaign open = open_campaign(request);
   const Campaign& campaign = open.campaign;
-  Findings findings;
+  Findings findings(as_json);
   findings.good(fmt::format("{}: {} fixed and {} moving markers of {}", campaign.file.string(),
                             campaign.fixed.size(), campaign.moving.size(), campaign.family));
   for (std::size_t c = 0; c < open.cameras.size(); ++c) {
@@ -109,8 +121,17 @@ int check(const MeasureRequest& request) {
   }
   check_poses(open, findings);
   check_photographs(open, findings);
-  fmt::print("{} photographs in {} poses; {}\n", open.listing.images.size(), open.listing.poses.size(),
-             findings.count() == 0 ? "nothing wrong found" : fmt::format("{} problems", findings.count()));
+  if (as_json) {
+    const nlohmann::ordered_json json{{"poses", open.listing.poses.size()},
+                                      {"photographs", open.listing.images.size()},
+                                      {"problems", findings.count()},
+                                      {"findings", findings.json()}};
+    fmt::print("{}\n", json.dump(1));
+  } else {
+    fmt::print("{} photographs in {} poses; {}\n", open.listing.images.size(), open.listing.poses.size(),
+               findings.count() == 0 ? "nothing wrong found" : fmt::format("{} problems", findings.count()));
+    if (findings.count() == 0) suggest_next("hexcal run " + shell_word(request.campaign.string()));
+  }
   return findings.count() == 0 ? kDone : kSomeFailed;
 }
 
@@ -124,9 +145,12 @@ void add_check_command(CLI::App& app, Action& action) {
       "  BAD  p003/IMG_0007.JPG: focal length: camera 35 mm, photograph 50 mm\n"
       "Exit code 0 nothing wrong, 1 problems listed, 2 a file that cannot be read.");
   auto request = std::make_shared<MeasureRequest>();
+  auto json = std::make_shared<bool>(false);
   command->add_option("campaign", request->campaign, "Campaign folder or its campaign.yaml")->required();
   command->add_option("--poses-dir", request->poses_dir, "Folder of photographs instead of the campaign's");
-  command->callback([request, &action] { action = [request] { return check(*request); }; });
+  command->add_flag("--json", *json, "Print what was found as JSON");
+  command->callback(
+      [request, json, &action] { action = [request, json] { return check(*request, *json); }; });
 }
 
 }  // namespace hexcal

@@ -10,6 +10,7 @@
 #include "kinematics/geometry/input_error.h"
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/compensate_report.h"
+#include "tools/hexcal/terminal.h"
 #include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/campaign_file.h"
@@ -166,6 +167,8 @@ int run_compensate(CompensateFlags flags) {
   const std::vector<fs::path> written = write_results(folder, head, report, commands);
   fmt::print("{}", flags.json ? compensation_json(report, table, commands, written)
                               : compensation_text(report, table, commands, written));
+  if (!flags.json && !flags.campaign.empty())
+    suggest_next("hexcal report " + shell_word(flags.campaign.string()));
   const bool all_ok =
       table.left_out.empty() && std::all_of(commands.begin(), commands.end(),
                                             [](const auto& c) { return c.status == CommandStatus::ok; });

@@ -149,6 +149,7 @@ int run_detect(const DetectFlags& flags) {
   } else {
     fmt::print("{}{} photographs, {} markers in {}\n", table.text(), set.photographs.size(), markers,
                flags.output.string());
+    suggest_next("hexcal measure CAMPAIGN --observations " + shell_word(flags.output.string()));
   }
   return failed ? kSomeFailed : kDone;
 }

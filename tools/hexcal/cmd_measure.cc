@@ -89,6 +89,11 @@ void refuse_foreign_camera(const std::filesystem::path& campaign, const Campaign
                                observations.photographs.front().seen.name, photographs.front().words));
 }
 
+std::string next_command(const std::filesystem::path& path, const Campaign& campaign) {
+  const bool machine_known = campaign.hexapod && (campaign.targets || campaign.legs);
+  return fmt::format("hexcal {} {}", machine_known ? "compensate" : "report", shell_word(path.string()));
+}
+
 int measure(MeasureFlags flags) {
   MeasureRequest& request = flags.request;
   request.interior_fixed = flags.interior == "fixed";
@@ -114,7 +119,8 @@ int measure(MeasureFlags flags) {
     fmt::print("{}", measurement_json(observations, result, open.listing));
   } else {
     fmt::print("{}", measurement_text(observations, result, open.listing));
-    for (const std::filesystem::path& path : written) fmt::print("wrote {}\n", path.string());
+    fmt::print("{}", written_line(written));
+    suggest_next(next_command(request.campaign, open.campaign));
   }
   return measurement_exit_code(result);
 }

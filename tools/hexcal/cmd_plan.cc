@@ -136,6 +136,8 @@ int run_plan(PlanFlags flags) {
   if (flags.json) {
     nlohmann::ordered_json out{{"written", flags.out.string()}, {"exchanges", plan.exchanges}};
     if (network) out["candidates_out_of_sight"] = unseen_and_seen - candidates.size();
+    out["poses"] = nlohmann::ordered_json::array();
+    out["predicted"] = nlohmann::ordered_json::array();
     for (const PoseRecord& record : records) out["poses"].push_back(record.id);
     for (std::size_t i = 0; i < plan.by_count.size(); ++i) {
       out["predicted"].push_back({{"poses", plan.by_count[i].poses},
@@ -162,6 +164,10 @@ int run_plan(PlanFlags flags) {
                candidates.size(), unseen_and_seen);
   fmt::print("wrote {} poses of {} candidates to {}\n", records.size(), candidates.size(),
              flags.out.string());
+  if (!flags.hexapod.empty()) {
+    suggest_next(fmt::format("hexcal legs --hexapod {} --poses {} -o legs.csv",
+                             shell_word(flags.hexapod.string()), shell_word(flags.out.string())));
+  }
   return kDone;
 }
 

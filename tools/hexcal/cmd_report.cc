@@ -93,6 +93,7 @@ int write_report(const ReportFlags& flags) {
   fmt::print("wrote {}\n", out.string());
   if (!figures.empty())
     fmt::print("wrote {} figures, SVG and PDF, to {}\n", figures.size(), flags.figures.string());
+  suggest_next("xdg-open " + shell_word(out.string()));
   return kDone;
 }
 

@@ -18,11 +18,17 @@ namespace {
 struct RunFlags {
   std::string campaign;
   std::string method;
+  bool json = false;
 };
 
-// One of the other commands with its own flags, as if typed.
-int run_stage(void (*add)(CLI::App&, Action&), std::vector<std::string> arguments) {
-  fmt::print("{}\n", coloured("== hexcal " + fmt::format("{}", fmt::join(arguments, " ")), Colour::bold));
+// One of the other commands with its own flags, as if typed. Its JSON becomes one member of the whole.
+int run_stage(void (*add)(CLI::App&, Action&), std::vector<std::string> arguments, bool json) {
+  if (json) {
+    fmt::print("{}\"{}\": ", arguments[0] == "measure" ? "{" : ", ", arguments[0]);
+    arguments.emplace_back("--json");
+  } else {
+    fmt::print("{}\n", coloured("== hexcal " + fmt::format("{}", fmt::join(arguments, " ")), Colour::bold));
+  }
   std::fflush(stdout);
   CLI::App app;
   Action action;
@@ -30,7 +36,7 @@ int run_stage(void (*add)(CLI::App&, Action&), std::vector<std::string> argument
   std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
   app.parse(arguments);
   const int code = action();
-  fmt::print("\n");
+  if (!json) fmt::print("\n");
   std::fflush(stdout);
   return code;
 }
@@ -38,15 +44,23 @@ int run_stage(void (*add)(CLI::App&, Action&), std::vector<std::string> argument
 int run_run(const RunFlags& flags) {
   const Campaign campaign = read_campaign(flags.campaign);
   const CampaignLock lock(campaign.folder / "results");
-  int worst = run_stage(add_measure_command, {"measure", flags.campaign});
+  auto held = std::make_unique<SuggestionsHeld>();
+  int worst = run_stage(add_measure_command, {"measure", flags.campaign}, flags.json);
   if (campaign.hexapod && campaign.targets) {
     std::vector<std::string> arguments{"compensate", flags.campaign};
     if (!flags.method.empty()) arguments.insert(arguments.end(), {"--method", flags.method});
-    worst = std::max(worst, run_stage(add_compensate_command, arguments));
-  } else {
+    worst = std::max(worst, run_stage(add_compensate_command, arguments, flags.json));
+  } else if (!flags.json) {
     fmt::print("not compensated: campaign.yaml names no {}\n\n", campaign.hexapod ? "targets" : "hexapod");
   }
-  return std::max(worst, run_stage(add_report_command, {"report", flags.campaign}));
+  worst = std::max(worst, run_stage(add_report_command, {"report", flags.campaign}, flags.json));
+  held.reset();
+  if (flags.json) {
+    fmt::print("}}\n");
+  } else {
+    suggest_next("xdg-open " + shell_word((campaign.folder / "results" / "report.html").string()));
+  }
+  return worst;
 }
 
 }  // namespace
@@ -57,6 +71,7 @@ void add_run_command(CLI::App& app, Action& action) {
       app.add_subcommand("run", "Photographs in, corrected actuator commands out: the main job");
   command->add_option("campaign", flags->campaign, "campaign folder")->required();
   command->add_option("--method", flags->method, "as for compensate (default: auto)");
+  command->add_flag("--json", flags->json, "print what the three commands print with --json, as one object");
   command->footer(
       "The same as: hexcal measure CAMPAIGN; hexcal compensate CAMPAIGN; hexcal report CAMPAIGN.\n"
       "Results are in CAMPAIGN/results: poses.csv, model.yaml, predicted_poses.csv, actuators.csv, "

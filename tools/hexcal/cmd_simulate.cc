@@ -71,6 +71,17 @@ int run_simulate(const SimulateFlags& flags) {
   fmt::print("{}: {} photographs, truth in {}\n", flags.out.string(), result.photographs,
              (flags.out / "truth").string());
   for (const std::string& line : result.skipped) fmt::print("  no photographs of {}\n", line);
+  const std::string out = shell_word(flags.out.string());
+  if (!flags.from.empty()) {
+    const std::string from = shell_word(flags.from.string());
+    suggest_next(fmt::format("cp {}/camera.yaml {} && hexcal measure {} && hexcal report {} --before {}",
+                             from, out, out, out, from));
+  } else if (fs::exists(flags.out / "camera.yaml")) {
+    suggest_next("hexcal run " + out);
+  } else if (fs::exists(flags.out / "calibration")) {
+    suggest_next(
+        fmt::format("hexcal camera {0}/calibration --template {0}/sheet.yaml -o {0}/camera.yaml", out));
+  }
   return result.skipped.empty() ? kDone : kSomeFailed;
 }
 

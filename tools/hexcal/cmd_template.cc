@@ -8,6 +8,7 @@
 #include "kinematics/geometry/input_error.h"
 #include "photogrammetry/markers/marker.h"
 #include "tools/hexcal/command.h"
+#include "tools/hexcal/terminal.h"
 #include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/sheet_file.h"
@@ -150,6 +151,10 @@ int run_template(const TemplateFlags& flags) {
   }
   fmt::print("wrote {} ({} page{}) and {} (for hexcal camera --template)\n", flags.output.string(), pages,
              pages == 1 ? "" : "s", yaml.string());
+  if (sheet.kind != SheetKind::markers) {
+    suggest_next(
+        fmt::format("hexcal camera PHOTOGRAPHS --template {} -o camera.yaml", shell_word(yaml.string())));
+  }
   return kDone;
 }
 

@@ -128,13 +128,14 @@ Json json_of_identified(const IdentifyResult& identified, const Identifiability&
            {"rank", judged.rank},
            {"determined", judged.determined},
            {"effective_parameters", identified.effective_parameters},
-           {"condition", judged.condition},
+           {"condition", finite(judged.condition)},
            {"sigma0", identified.sigma0_of_measurement},
            {"position_sigma_mm", identified.position_sigma_mm},
            {"orientation_sigma_deg", identified.orientation_sigma_rad * kDegPerRad},
            {"leg_sigma_mm", identified.leg_sigma_mm},
            {"advice", judged.advice},
            {"beyond_geometry", judged.beyond_geometry}};
+  for (const char* list : {"parameters", "correlations", "weak", "legs", "poses"}) out[list] = Json::array();
   for (const ParameterReport& p : judged.parameters)
     out["parameters"].push_back({{"name", p.name},
                                  {"unit", p.unit},
@@ -194,9 +195,7 @@ std::string compensation_text(const CalibrationReport& report, const Observation
                         with_sigma, std::sqrt(squares_mm / with_sigma),
                         std::sqrt(squares_rad / with_sigma) * kDegPerRad);
   }
-  std::vector<std::string> names;
-  for (const auto& path : written) names.push_back(path.string());
-  return text + fmt::format("wrote {}\n", fmt::join(names, ", "));
+  return text + written_line(written);
 }
 
 std::string compensation_json(const CalibrationReport& report, const ObservationTable& table,
@@ -206,6 +205,7 @@ std::string compensation_json(const CalibrationReport& report, const Observation
            {"why", report.why},
            {"leave_one_out", report.comparison.leave_one_out},
            {"folds", report.comparison.folds}};
+  for (const char* list : {"methods", "left_out", "commands", "written"}) out[list] = Json::array();
   for (std::size_t i = 0; i < report.comparison.methods.size(); ++i) {
     const CrossValidation& method = report.comparison.methods[i];
     Json entry{{"name", method.name}, {"numbers", method.complexity}};

@@ -6,13 +6,29 @@
 
 #include "kinematics/geometry/input_error.h"
 #include "tools/hexcal/commands.h"
+#include "tools/hexcal/terminal.h"
 #include "tools/hexcal/version.h"
+
+namespace {
+
+bool wants_json(const CLI::App& app) {
+  for (const CLI::App* command : app.get_subcommands()) {
+    const CLI::Option* json = command->get_option_no_throw("--json");
+    if (json != nullptr && json->count() > 0) return true;
+  }
+  return false;
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);  // a file size limit is an error of the write that meets it, with words
   CLI::App app{"hexcal: calibration of a Stewart platform by photographs", "hexcal"};
   app.set_version_flag("--version", fmt::format("hexcal {}", hexcal::kVersion));
   app.require_subcommand(1);
+  app.fallthrough();  // --quiet may stand behind the command too
+  bool quiet = false;
+  app.add_flag("--quiet", quiet, "Print nothing but errors (and what --json asks for)");
   hexcal::Action action;
   // In the order of a day's work.
   for (const auto add :
@@ -26,6 +42,7 @@ int main(int argc, char** argv) {
   }
   try {
     app.parse(argc, argv);
+    if (quiet && !wants_json(app)) hexcal::silence_words();
     return action();
   } catch (const CLI::Success& done) {  // --help, --version
     return app.exit(done);

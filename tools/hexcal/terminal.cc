@@ -1,11 +1,15 @@
 #include "tools/hexcal/terminal.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
+#include <stdexcept>
 
 namespace hexcal {
 namespace {
@@ -44,6 +48,9 @@ std::size_t shown_width(std::string_view text) {
 
 constexpr std::size_t kBarWidth = 30;
 
+bool words_silent = false;
+int suggestions_held = 0;
+
 }  // namespace
 
 std::string coloured(std::string_view text, Colour colour) {
@@ -51,10 +58,49 @@ std::string coloured(std::string_view text, Colour colour) {
   return fmt::format("{}{}\x1b[0m", escape(colour), text);
 }
 
+void silence_words() {
+  words_silent = true;
+  if (std::freopen("/dev/null", "w", stdout) == nullptr)
+    throw std::runtime_error("/dev/null cannot be opened");
+}
+
+void suggest_next(const std::string& command) {
+  if (suggestions_held == 0) fmt::print("{}\n", coloured("next: " + command, Colour::dim));
+}
+
+SuggestionsHeld::SuggestionsHeld() { ++suggestions_held; }
+SuggestionsHeld::~SuggestionsHeld() { --suggestions_held; }
+
+std::string shell_word(const std::string& text) {
+  const bool plain = !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) {
+    return std::isalnum(c) != 0 ||
+           std::string_view("/._-+,:=@%").find(static_cast<char>(c)) != std::string::npos;
+  });
+  if (plain) return text;
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
+std::string written_line(const std::vector<std::filesystem::path>& files) {
+  std::map<std::string, std::vector<std::string>> by_folder;
+  std::vector<std::string> folders;
+  for (const std::filesystem::path& file : files) {
+    const std::string folder = file.parent_path().string();
+    if (by_folder.count(folder) == 0) folders.push_back(folder);
+    by_folder[folder].push_back(file.filename().string());
+  }
+  std::string out;
+  for (const std::string& folder : folders)
+    out +=
+        fmt::format("wrote {}{}\n", folder.empty() ? "" : folder + ": ", fmt::join(by_folder[folder], ", "));
+  return out;
+}
+
 ProgressBar::ProgressBar(std::string label, std::size_t total)
     : label_(std::move(label)),
       total_(total),
-      shown_(total > 0 && ::isatty(STDERR_FILENO) != 0),
+      shown_(!words_silent && total > 0 && ::isatty(STDERR_FILENO) != 0),
       start_(std::chrono::steady_clock::now()) {
   if (shown_) draw();
 }

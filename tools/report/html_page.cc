@@ -170,6 +170,7 @@ Html html_facts(const std::vector<std::pair<std::string, std::string>>& facts) {
 }
 
 Html html_provenance(const std::vector<std::pair<std::string, std::string>>& facts) {
+  if (facts.empty()) return {};
   Html rows;
   for (const auto& [term, value] : facts) {
     const Html head = html_element("th", html_text(term), {{"scope", "row"}, {"class", "words"}});
