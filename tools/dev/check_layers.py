@@ -21,6 +21,7 @@ ARROWS = {
     "tools/report": ["pose_extract", "calibration", "tools/io"],
     "tools/hexcal": ["tools/io", "tools/synthetic", "tools/report"],
     "tools/bench": ["tools/io", "tools/synthetic", "tools/report"],
+    "tools/python": ["tools/hexcal"],
 }
 BANNED_NAMES = re.compile(r"(^|[_.-])(utils?|misc|common|helpers?)([_.-]|$)")
 PRIVATE_HEADERS = re.compile(r"<(ceres|pcl|apriltag|exiv2|libraw)/")

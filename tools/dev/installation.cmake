@@ -1,5 +1,6 @@
 # `cmake --install`: the program with manual, completions and documents, and the modules as libraries for
-# find_package(hexcal). `cpack`: the same as Debian packages hexcal and libhexcal-dev.
+# find_package(hexcal). `cpack`: the same as Debian packages hexcal, libhexcal-dev and
+# python3-hexcal.
 
 # Headers and documents keep the folders of the source, so that includes and links hold.
 foreach(folder kinematics photogrammetry camera_calib pose_extract calibration tools/io)
@@ -48,6 +49,17 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
     "libapriltag-dev, libcairo2-dev, libceres-dev, libeigen3-dev, libexiv2-dev, libfmt-dev, libjpeg-dev, \
 libopencv-dev, libpcl-dev, libraw-dev, libssl-dev, libtbb-dev, libyaml-cpp-dev, nlohmann-json3-dev, pkg-config")
+if(HEXCAL_BUILD_PYTHON)
+  math(EXPR python_next "${Python_VERSION_MINOR} + 1")
+  list(APPEND CPACK_COMPONENTS_ALL python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-hexcal)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3 (>= ${Python_VERSION_MAJOR}.${Python_VERSION_MINOR}), \
+python3 (<< ${Python_VERSION_MAJOR}.${python_next}~), python3-numpy")
+  set(CPACK_COMPONENT_PYTHON_DESCRIPTION
+      "calibration of a Stewart platform by photographs (Python module)
+ Kinematics, measurement, identification and compensation on numpy arrays.")
+endif()
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION
     "calibration of a Stewart platform by photographs (libraries)
  Static libraries and headers of hexcal's modules, for find_package(hexcal).")

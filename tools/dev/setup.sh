@@ -8,6 +8,8 @@ packages=(
   # libraries
   libopencv-dev libceres-dev libeigen3-dev libapriltag-dev libpcl-dev libfmt-dev libcli11-dev libyaml-cpp-dev
   nlohmann-json3-dev libexiv2-dev libraw-dev libcairo2-dev libtbb-dev libjpeg-dev libssl-dev libjs-three
+  # Python module (left out where these are missing)
+  pybind11-dev python3-dev python3-numpy
   # tests
   libgtest-dev libgmock-dev libbenchmark-dev liblensfun-dev liblensfun-data-v1 poppler-utils opencv-doc
 )
