@@ -13,6 +13,7 @@
 #include "tools/hexcal/terminal.h"
 #include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/calibration_record.h"
 #include "tools/io/campaign_file.h"
 #include "tools/io/hexapod_file.h"
 #include "tools/io/model_file.h"
@@ -134,12 +135,11 @@ int run_compensate(CompensateFlags flags) {
   defaults.frames_known = flags.frames == "known";
   if (flags.position_sigma_mm > 0) defaults.position_sigma_mm = flags.position_sigma_mm;
   if (flags.orientation_sigma_deg > 0) defaults.orientation_sigma_deg = flags.orientation_sigma_deg;
-  ObservationTable table = read_observations(nominal,
-                                             {.poses = flags.poses,
-                                              .targets = optional_path(flags.targets),
-                                              .legs = optional_path(flags.legs),
-                                              .covariance = optional_path(flags.covariance)},
-                                             defaults);
+  const ObservationFiles files{.poses = flags.poses,
+                               .targets = optional_path(flags.targets),
+                               .legs = optional_path(flags.legs),
+                               .covariance = optional_path(flags.covariance)};
+  ObservationTable table = read_observations(nominal, files, defaults);
   std::vector<fs::path> inputs{flags.hexapod, flags.targets, flags.poses, flags.legs, flags.covariance};
   if (flags.round > 1) add_later_rounds(nominal, flags, defaults, table, inputs);
 
@@ -153,6 +153,14 @@ int run_compensate(CompensateFlags flags) {
     options.identify.adapt_tolerances = false;
   }
   const CalibrationReport report = calibrate(nominal, table.observations, options);
+  // The settings that a report of the campaign would use; others are no concern of its page.
+  const bool plain = flags.round == 1 && defaults.frames_known && flags.fixed.empty() &&
+                     flags.tolerance_mm <= 0 && !defaults.position_sigma_mm &&
+                     !defaults.orientation_sigma_deg;
+  if (plain && !flags.campaign.empty()) {
+    const std::string key = calibration_key(kVersion, flags.hexapod, files, flags.method);
+    write_file_atomically(flags.out / "calibration.json", calibration_record_text(key, report));
+  }
 
   std::vector<Target> targets;
   if (!flags.apply.empty() || !flags.targets.empty())

@@ -8,6 +8,7 @@
 #include "tools/hexcal/network_part.h"
 #include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/calibration_record.h"
 #include "tools/io/camera_file.h"
 #include "tools/io/campaign_file.h"
 #include "tools/io/hexapod_file.h"
@@ -54,9 +55,15 @@ void add_compensation(const Campaign& campaign, const std::string& method, Campa
     CompensationPart part;
     part.nominal = read_hexapod_file(*campaign.hexapod);
     part.observations = read_observations(part.nominal, files).observations;
-    CalibrateOptions options;
-    options.method = method;
-    part.calibration = calibrate(part.nominal, part.observations, options);
+    const std::string key = calibration_key(kVersion, *campaign.hexapod, files, method);
+    if (auto record = read_calibration_record(results / "calibration.json", key)) {
+      part.calibration = std::move(*record);
+    } else {
+      CalibrateOptions options;
+      options.method = method;
+      part.calibration = calibrate(part.nominal, part.observations, options);
+      write_file_atomically(results / "calibration.json", calibration_record_text(key, part.calibration));
+    }
     report.compensation = std::move(part);
   } catch (const InputError& error) {
     // The measurement is worth a report even where nothing can be identified from it.

@@ -8,8 +8,8 @@
 namespace hexcal {
 
 /// Everything that the files of a measured campaign say, for its page; parts that are missing say so. The
-/// machine is identified anew by `method`, as `hexcal compensate` does: that costs less than reading its
-/// result back would save. Throws InputError for what is wrong in the campaign's own files.
+/// machine is identified by `method` as `hexcal compensate` does, unless results/calibration.json holds that
+/// already. Throws InputError for what is wrong in the campaign's own files.
 [[nodiscard]] CampaignReport read_campaign_report(const std::filesystem::path& campaign,
                                                   const std::string& method);
 

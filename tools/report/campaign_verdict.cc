@@ -104,7 +104,7 @@ void judge_network(const NetworkPart& network, Verdict& verdict) {
 
 // An identified machine whose residuals are what the measurement's noise promises.
 bool fits_to_noise(const CalibrationReport& calibration) {
-  return calibration.fitted.identified && calibration.fitted.identified->sigma0 < 2;
+  return calibration.fitted.identified && calibration.fitted.identified->sigma0_of_measurement < 2;
 }
 
 void judge_compensation(const CampaignReport& report, const CrossValidation& method, Verdict& verdict) {

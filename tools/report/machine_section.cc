@@ -85,10 +85,12 @@ Html machine_section(const CompensationPart& part) {
   out += html_facts({{"free parameters", std::to_string(identifiability.free_parameters)},
                      {"determined by the poses", std::to_string(identifiability.determined)},
                      {"condition", significant_text(identifiability.condition, 2)},
-                     {"sigma0", significant_text(identified.sigma0, 3)},
+                     {"sigma0", significant_text(identified.sigma0_of_measurement, 3)},
                      {"leg noise", significant_text(identified.leg_sigma_mm, 2) + " mm"}});
   Html legs;
   for (const LegDiagnosis& leg : identifiability.legs) legs += html_element("li", html_text(leg.sentence));
+  for (const std::string& words : identifiability.beyond_geometry)
+    legs += html_element("li", html_text(words));
   out += html_element("ul", legs);
   const Chart corrections = correction_chart(identifiability);
   if (!corrections.panels.empty()) out += html_figure(corrections);
