@@ -149,7 +149,8 @@ int run_evaluate(const EvaluateFlags& flags) {
     tables.push_back(read_table(path, label, targets));
   }
   std::vector<std::string> common;
-  for (const auto& [id, pose] : tables[0].poses) {
+  for (const auto& shared : tables[0].poses) {
+    const std::string& id = shared.first;
     if (std::all_of(tables.begin(), tables.end(), [&](const auto& t) { return t.poses.count(id) == 1; }))
       common.push_back(id);
   }
