@@ -9,9 +9,12 @@
 namespace hexcal {
 namespace {
 
-// A pseudo-random number of a pixel: thinning must not alias with the pattern.
-std::uint32_t pixel_lot(int x, int y) {
-  std::uint32_t h = static_cast<std::uint32_t>(x) * 0x9E3779B1U ^ static_cast<std::uint32_t>(y) * 0x85EBCA77U;
+constexpr int kTile = 8;  // px; JPEG's blocks, on its grid
+
+// A pseudo-random number of a tile: thinning must not alias with the pattern.
+std::uint32_t tile_lot(int column, int row) {
+  std::uint32_t h =
+      static_cast<std::uint32_t>(column) * 0x9E3779B1U ^ static_cast<std::uint32_t>(row) * 0x85EBCA77U;
   h ^= h >> 15;
   h *= 0x2C1B3C6DU;
   h ^= h >> 12;
@@ -20,19 +23,37 @@ std::uint32_t pixel_lot(int x, int y) {
   return h;
 }
 
-// Pixels of the row y that can be near the square grown by `margin` (in half sides of the square).
+// The order in which a tile's pixels are taken, 8 y + x: any first few are spread evenly (Bayer 1973).
+constexpr std::array<unsigned, kTile* kTile> kBayerOrder = [] {
+  std::array<unsigned, kTile * kTile> order{};
+  for (unsigned k = 0; k < order.size(); ++k) {
+    unsigned x = 0;
+    unsigned y = 0;
+    for (unsigned bit = 0; bit < 3; ++bit) {
+      const unsigned a = (k >> (2 * bit)) & 1U;
+      const unsigned b = (k >> (2 * bit + 1)) & 1U;
+      x |= (a ^ b) << (2 - bit);
+      y |= a << (2 - bit);
+    }
+    order[k] = kTile * y + x;
+  }
+  return order;
+}();
+
+// Columns between low and high that a quadrilateral covers in the rows between top and bottom.
 struct Span {
   int first, last;
 };
-Span span_in_row(const std::array<Eigen::Vector2d, 4>& hull, double y, const cv::Rect& box) {
+Span span_in_rows(const std::array<Eigen::Vector2d, 4>& hull, double top, double bottom,
+                  const cv::Rect& box) {
   double left = std::numeric_limits<double>::infinity();
   double right = -left;
   for (std::size_t i = 0; i < 4; ++i) {
     const Eigen::Vector2d& a = hull[i];
     const Eigen::Vector2d& b = hull[(i + 1) % 4];
-    // The part of the side within half a pixel row.
-    const double low = std::max(std::min(a.y(), b.y()), y - 1);
-    const double high = std::min(std::max(a.y(), b.y()), y + 1);
+    // The part of the side within the rows.
+    const double low = std::max(std::min(a.y(), b.y()), top);
+    const double high = std::min(std::max(a.y(), b.y()), bottom);
     if (low > high) continue;
     for (const double at : {low, high}) {
       const double share = std::abs(b.y() - a.y()) < 1e-9 ? 0.0 : (at - a.y()) / (b.y() - a.y());
@@ -109,37 +130,6 @@ FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, 
     hull = grown;
   }
 
-  // Most of a large marker is far from any transition: whole tiles of 8 x 8 pixels are passed over when the
-  // pattern does not change within the reach of any of their pixels. Within a tile the map to cells is taken
-  // as linear when the single pixels are looked at.
-  constexpr int kTile = 8;
-  constexpr double kTileReach = 1.1 * kTile;  // half its diagonal, 5.7 px, and perspective within it
-  struct Tile {
-    bool wanted = false;
-    Eigen::Vector2d cells;  // of its middle
-    Eigen::Matrix2d by_px;
-    Eigen::Vector2d reach;  // of one pixel, in cells
-  };
-  constexpr double kMiddle = 0.5 * (kTile - 1);
-  std::vector<Tile> tiles(static_cast<std::size_t>(box.width / kTile + 1));
-  const auto look_at_tiles = [&](int top) {
-    const PixelMapPatch::Row row = patch.row(top + kMiddle);
-    int left = box.x;
-    for (Tile& tile : tiles) {
-      const PixelMapPatch::Point ideal = row.at(left + kMiddle);
-      left += kTile;
-      const SquarePoint square =
-          square_point(selection.homography, (ideal.ideal - frame.middle) * px_to_plane);
-      tile.by_px = square.by_point * ideal.by_px * (px_to_plane * half_square);
-      tile.cells = square.t * half_square + Eigen::Vector2d::Constant(half_pattern);
-      tile.reach = tile.by_px.rowwise().norm();
-      const double reach = selection.reach_px + kTileReach;
-      tile.wanted =
-          square.scale > 0 && request.pattern.has_transition(tile.cells.x(), tile.cells.y(),
-                                                             reach * tile.reach.x(), reach * tile.reach.y());
-    }
-  };
-
   // Thinning needs the number of candidates: about the share of the outline's area. Pixels near a transition
   // tell most of its place, those farther off the levels.
   double area = 0;
@@ -153,16 +143,39 @@ FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, 
   const double all = within(selection.reach_px);
   const double near = std::min(within(selection.near_px), all);
   const double share = selection.max_pixels / std::max(near + (all - near) / 4, 1.0);
-  const auto most_of = [](double taken) { return static_cast<std::uint64_t>(0x1p32 * std::min(taken, 1.0)); };
-  const std::uint64_t near_lots = most_of(share);
-  const std::uint64_t far_lots = most_of(share / 4);
+  const auto of_tile = [](double taken) { return kTile * kTile * std::min(taken, 1.0); };
+  const double near_share = of_tile(share);
+  const double far_share = of_tile(share / 4);
 
-  const auto take = [&](int x, int y, const Tile& tile, const Eigen::Vector2d& from_middle,
+  // Most of a large marker is far from any transition: whole tiles are passed over when the pattern does not
+  // change within the reach of any of their pixels. Within a tile the map to cells is taken as linear when
+  // the single pixels are looked at.
+  constexpr double kMiddle = 0.5 * (kTile - 1);
+  constexpr double kTileReach = 1.1 * kTile;  // half its diagonal, 5.7 px, and perspective within it
+  struct Tile {
+    Eigen::Vector2d cells;  // of its middle
+    Eigen::Matrix2d by_px;
+    Eigen::Vector2d reach;  // of one pixel, in cells
+  };
+  const auto tile_at = [&](const PixelMapPatch::Row& middle_row, int left) -> std::optional<Tile> {
+    const PixelMapPatch::Point ideal = middle_row.at(left + kMiddle);
+    const SquarePoint square = square_point(selection.homography, (ideal.ideal - frame.middle) * px_to_plane);
+    if (!(square.scale > 0)) return std::nullopt;
+    Tile tile;
+    tile.by_px = square.by_point * ideal.by_px * (px_to_plane * half_square);
+    tile.cells = square.t * half_square + Eigen::Vector2d::Constant(half_pattern);
+    tile.reach = tile.by_px.rowwise().norm();
+    const double reach = selection.reach_px + kTileReach;
+    if (!request.pattern.has_transition(tile.cells.x(), tile.cells.y(), reach * tile.reach.x(),
+                                        reach * tile.reach.y())) {
+      return std::nullopt;
+    }
+    return tile;
+  };
+
+  const auto take = [&](int x, int y, double reach, const Tile& tile, const Eigen::Vector2d& from_middle,
                         const PixelMapPatch::Row& row) {
-    const std::uint32_t lot = pixel_lot(x, y);
-    if (lot >= near_lots) return;
     const Eigen::Vector2d about = tile.cells + tile.by_px * from_middle;
-    const double reach = lot < far_lots ? selection.reach_px : selection.near_px;
     if (!request.pattern.has_transition(about.x(), about.y(), reach * tile.reach.x(), reach * tile.reach.y()))
       return;
     const PixelMapPatch::Point ideal = row.at(x);
@@ -190,24 +203,35 @@ FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, 
       return std::clamp(static_cast<int>(std::floor(at)), -1, cells) + 1;
     };
     pixel.cell = cell_of(u.y()) * (cells + 2) + cell_of(u.x());
-    pixel.block = ((y >> 3) - (box.y >> 3)) * ((box.width >> 3) + 2) + ((x >> 3) - (box.x >> 3));
+    pixel.block = (y / kTile - box.y / kTile) * (box.width / kTile + 2) + (x / kTile - box.x / kTile);
     result.pixels.push_back(pixel);
   };
 
-  for (int y = box.y; y < box.y + box.height; ++y) {
-    const int in_tile_y = (y - box.y) % kTile;
-    if (in_tile_y == 0) look_at_tiles(y);
-    const Span span = span_in_row(hull, y, box);
+  const int bottom = box.y + box.height - 1;
+  std::array<PixelMapPatch::Row, kTile> rows;
+  for (int tile_row = box.y / kTile; tile_row <= bottom / kTile; ++tile_row) {
+    const int top = tile_row * kTile;
+    const Span span = span_in_rows(hull, top - 1, top + kTile, box);
     if (span.first > span.last) continue;
-    const PixelMapPatch::Row row = patch.row(y);
-    for (int x = span.first; x <= span.last; ++x) {
-      const int at = (x - box.x) / kTile;
-      const Tile& tile = tiles[static_cast<std::size_t>(at)];
-      const int left = box.x + at * kTile;
-      if (tile.wanted) {
-        take(x, y, tile, {x - left - kMiddle, in_tile_y - kMiddle}, row);
-      } else {
-        x = left + kTile - 1;
+    const PixelMapPatch::Row middle_row = patch.row(top + kMiddle);
+    for (int i = 0; i < kTile; ++i) rows[static_cast<std::size_t>(i)] = patch.row(top + i);
+    for (int column = span.first / kTile; column <= span.last / kTile; ++column) {
+      const int left = column * kTile;
+      const std::optional<Tile> tile = tile_at(middle_row, left);
+      if (!tile) continue;
+      const std::uint32_t lot = tile_lot(column, tile_row);
+      const double rounding = (lot >> 6) * 0x1p-26;  // at random, so that parts of a pixel count
+      const auto near_pixels = static_cast<std::size_t>(near_share + rounding);
+      const auto far_pixels = static_cast<std::size_t>(far_share + rounding);
+      for (std::size_t k = 0; k < near_pixels; ++k) {
+        const auto at = static_cast<int>(kBayerOrder[k] ^ (lot & 63U));
+        const int in_x = at % kTile;
+        const int in_y = at / kTile;
+        const int x = left + in_x;
+        const int y = top + in_y;
+        if (x < box.x || x >= box.x + box.width || y < box.y || y > bottom) continue;
+        take(x, y, k < far_pixels ? selection.reach_px : selection.near_px, *tile,
+             {in_x - kMiddle, in_y - kMiddle}, rows[static_cast<std::size_t>(in_y)]);
       }
     }
   }

@@ -64,7 +64,7 @@ struct PixelSelection {
   int max_pixels = 0;   ///< thinned to about so many
 };
 
-/// The pixels around the pattern's transitions, row by row.
+/// The pixels around the pattern's transitions, by blocks of 8 x 8.
 [[nodiscard]] FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph,
                                       const PixelMapPatch& patch, const FitRequest& request,
                                       const cv::Rect& box, const PixelSelection& selection);
