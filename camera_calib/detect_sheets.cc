@@ -1,7 +1,5 @@
 #include "camera_calib/detect_sheets.h"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <map>
 #include <optional>
@@ -186,7 +184,9 @@ void detect_family(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>
       first += 4;
     }
   }
-  for (const MarkerObservation& marker : detect_markers(grey, tone, marker_family(family))) {
+  DetectionOptions only_roughly;
+  only_roughly.refine.first_look = true;
+  for (const MarkerObservation& marker : detect_markers(grey, tone, marker_family(family), only_roughly)) {
     const auto place = places.find(marker.id);
     if (place == places.end()) {
       if (marker.status == MarkerStatus::ok) out.foreign_ids.push_back(marker.id);
@@ -276,28 +276,31 @@ std::vector<FeatureObservation> refine_sheets(const cv::Mat& grey, ToneCurve ton
                                               const CameraModel& camera,
                                               const std::vector<SheetView>& views) {
   std::vector<FeatureObservation> out;
+  std::vector<MarkerGuess> guesses;
+  std::vector<std::pair<int, int>> places;  // of the guesses: sheet, first point
   for (const SheetView& view : views) {
     const Sheet& sheet = sheets[static_cast<std::size_t>(view.sheet)];
     const PredictedSheet predicted(sheet, shapes[static_cast<std::size_t>(view.sheet)], camera,
                                    view.camera_from_sheet);
     const std::vector<SheetMarker>& markers = predicted.geometry().markers;
-    std::vector<std::optional<FeatureObservation>> measured(markers.size());
-    tbb::parallel_for(std::size_t{0}, markers.size(), [&](std::size_t m) {
-      std::array<Eigen::Vector2d, 4> corners;
-      for (std::size_t i = 0; i < 4; ++i) {
+    for (std::size_t m = 0; m < markers.size(); ++m) {
+      MarkerGuess guess{&marker_family(sheet.family).patterns[static_cast<std::size_t>(markers[m].id)], {}};
+      bool in_frame = true;
+      for (std::size_t i = 0; in_frame && i < 4; ++i) {
         const auto px = predicted.at(predicted.points_mm()[4 * m + i]);
-        if (!px) return;
-        corners[i] = *px;
+        in_frame = px.has_value();
+        if (px) guess.corners_px[i] = *px;
       }
-      const auto& pattern = marker_family(sheet.family).patterns[static_cast<std::size_t>(markers[m].id)];
-      const MarkerObservation marker = refine_marker(grey, tone, pattern, corners, {}, &camera);
-      measured[m] = feature_of_marker(marker, view.sheet, 4 * static_cast<int>(m));
-    });
-    for (auto& feature : measured) {
-      if (feature) out.push_back(std::move(*feature));
+      if (!in_frame) continue;
+      guesses.push_back(guess);
+      places.emplace_back(view.sheet, 4 * static_cast<int>(m));
     }
     measure_saddles(grey, tone, predicted, view.sheet, sheet, out);
     measure_dots(grey, predicted, view.sheet, out);
+  }
+  const std::vector<MarkerObservation> refined = refine_markers(grey, tone, guesses, {}, &camera);
+  for (std::size_t k = 0; k < refined.size(); ++k) {
+    out.push_back(feature_of_marker(refined[k], places[k].first, places[k].second));
   }
   prefer_saddles(sheets, out);
   sort_features(out);

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <map>
 
+#include "camera_calib/bent_markers.h"
 #include "camera_calib/detect_sheets.h"
-#include "camera_calib/remeasure_markers.h"
 #include "camera_calib/robust_fit.h"
 
 namespace hexcal {
@@ -106,8 +106,25 @@ void leave_out_other_settings(std::vector<SheetPhotograph>& photographs) {
   }
 }
 
-// The photometric model holds the lens, so that a lens that was known only roughly bends corners where
-// markers are large in the frame: with a camera from all corners, those that it moves are measured again.
+// Measures the photographs that `wanted` names, with the state's lens in the photometric model and at every
+// place where the state's views predict a feature.
+template <typename Wanted>
+void measure_again(const std::vector<Sheet>& sheets, const Pixels& pixels, const CalibrationState& state,
+                   const Wanted& wanted, std::vector<SheetPhotograph>& photographs) {
+  tbb::parallel_for(std::size_t{0}, photographs.size(), [&](std::size_t i) {
+    std::vector<SheetView> views;
+    for (const SheetView& view : state.views) {
+      if (view.photograph == static_cast<int>(i)) views.push_back(view);
+    }
+    if (views.empty() || !wanted(i)) return;
+    const Photograph photograph = pixels.get(i);
+    photographs[i].features =
+        refine_sheets(photograph.grey, photograph.tone, sheets, state.shapes, state.camera, views);
+  });
+}
+
+// A lens that was known only roughly bends corners where markers are large in the frame: with a camera from
+// all corners, photographs whose markers it bends otherwise are measured again.
 void remeasure(const std::vector<Sheet>& sheets, const Pixels& pixels, CalibrationState state,
                double sigma_px, std::vector<SheetPhotograph>& photographs) {
   constexpr int kRounds = 2;
@@ -119,16 +136,15 @@ void remeasure(const std::vector<Sheet>& sheets, const Pixels& pixels, Calibrati
     if (!fit.adjustment.converged) return;
     state = fit.adjustment.state;
     sigma_px = std::max(fit.extra_sigma_px, kLeastRoughSigmaPx);
-    std::atomic<std::size_t> count = 0;
-    tbb::parallel_for(std::size_t{0}, photographs.size(), [&](std::size_t i) {
-      const std::vector<std::size_t> which =
-          markers_bent_otherwise(photographs[i].features, before, state.camera);
-      if (which.empty()) return;
-      const Photograph photograph = pixels.get(i);
-      remeasure_markers(photograph.grey, photograph.tone, sheets, state.camera, which,
-                        photographs[i].features);
-      count += which.size();
-    });
+    std::atomic<int> count = 0;
+    measure_again(
+        sheets, pixels, state,
+        [&](std::size_t i) {
+          const bool bent = bent_otherwise(photographs[i].features, before, state.camera);
+          count += bent ? 1 : 0;
+          return bent;
+        },
+        photographs);
     if (count == 0) return;
   }
 }
@@ -159,18 +175,13 @@ MeasuredCamera measure_camera(const std::vector<fs::path>& paths, const std::vec
   out.calibration = rough_calibration(sheets, out.photographs, options);
   if (out.calibration.status != CalibrationStatus::ok) return out;
   const CalibrationState& rough = out.calibration.fit.adjustment.state;
-  tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t i) {
-    std::vector<SheetView> views;
-    for (const SheetView& view : rough.views) {
-      if (view.photograph == static_cast<int>(i)) views.push_back(view);
-    }
-    if (!views.empty()) {
-      const Photograph photograph = pixels.get(i);
-      out.photographs[i].features =
-          refine_sheets(photograph.grey, photograph.tone, sheets, rough.shapes, rough.camera, views);
-    }
-    if (on_photograph) on_photograph();
-  });
+  measure_again(
+      sheets, pixels, rough,
+      [&](std::size_t) {
+        if (on_photograph) on_photograph();
+        return true;
+      },
+      out.photographs);
   const double sigma_px = std::max(out.calibration.fit.extra_sigma_px, kLeastRoughSigmaPx);
   remeasure(sheets, pixels, rough, sigma_px, out.photographs);
   out.calibration = calibrate_camera(sheets, with_features(rough, out.photographs), sigma_px, options);

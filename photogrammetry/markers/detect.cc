@@ -3,24 +3,18 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
 
 #include "kinematics/geometry/input_error.h"
-#include "kinematics/geometry/median.h"
 #include "photogrammetry/markers/marker_decoder.h"
-#include "photogrammetry/markers/marker_verdict.h"
 #include "photogrammetry/markers/quad_finder.h"
 
 namespace hexcal {
 namespace {
 
 constexpr double kFrameMarginPx = 2;
-constexpr double kMaxNoiseFactor = 6;  // JPEG's errors at edges over the noise of flat areas; more is misfit
-constexpr double kSharedSidePx = 40;   // smaller markers tell little of the tone curve and the lens
-using Shared = Eigen::Matrix<double, kNumShared, 1>;
 
 // For finding and reading only: 16 bits become 8, linear light through a square root.
 cv::Mat eight_bit(const cv::Mat& grey, ToneCurve tone) {
@@ -116,41 +110,6 @@ MarkerObservation observation_as_read(const DecodedMarker& marker, MarkerStatus 
   return observation;
 }
 
-// All markers' evidence about the tone curve and the lens stand-in together (their fits' Schur complements).
-Shared pool(const std::vector<PhotometricFit>& fits) {
-  Eigen::Matrix<double, kNumShared, kNumShared> information;
-  information.setZero();
-  information.diagonal() << 4, 4, 10, 10;  // weak: 0.5 and 0.3
-  Shared rhs = Shared::Zero();
-  std::vector<double> quality;
-  for (const auto& fit : fits) {
-    if (fit.converged) quality.push_back(fit.chi2_per_dof);
-  }
-  if (quality.empty()) return rhs;
-  const double limit = 3 * median(quality);
-  for (const auto& fit : fits) {
-    if (!fit.converged || fit.chi2_per_dof > limit || fit.saturated > 0.02 || fit.visible < 0.8) continue;
-    const auto weighted = fit.shared_information / std::max(fit.chi2_per_dof, 0.1);
-    information += weighted;
-    rhs += weighted * fit.shared;
-  }
-  return information.ldlt().solve(rhs);
-}
-
-ResidualLevel residual_level(const std::vector<PhotometricFit>& fits) {
-  std::vector<double> noise;
-  std::vector<double> correlation;
-  for (const auto& fit : fits) {
-    if (!fit.converged) continue;
-    noise.push_back(fit.chi2_per_dof);
-    correlation.push_back(fit.covariance_factor / fit.chi2_per_dof);
-  }
-  if (noise.empty()) return {};
-  // A few markers cannot tell noise from their own misfit.
-  return {noise.size() < 4 ? 1 : std::clamp(median(noise), 1.0, kMaxNoiseFactor),
-          std::max(1.0, median(correlation))};
-}
-
 }  // namespace
 
 void DetectionOptions::validate() const {
@@ -167,45 +126,17 @@ std::vector<MarkerObservation> detect_markers(const cv::Mat& grey, ToneCurve ton
   const std::vector<DecodedMarker> markers = read_markers(eight_bit(grey, tone), family, options);
   std::vector<MarkerObservation> observations;
   std::vector<std::size_t> measured;
+  std::vector<MarkerGuess> guesses;
   for (std::size_t i = 0; i < markers.size(); ++i) {
     observations.push_back(observation_as_read(markers[i], status_as_read(markers[i], grey)));
-    if (observations.back().status == MarkerStatus::ok) measured.push_back(i);
+    if (observations.back().status != MarkerStatus::ok) continue;
+    measured.push_back(i);
+    guesses.push_back({&family.patterns[static_cast<std::size_t>(markers[i].id)], markers[i].corners_px});
   }
-  if (measured.empty()) return observations;
-
-  PhotographModel photograph{camera != nullptr ? PixelMap(*camera) : PixelMap(grey.cols, grey.rows, {}),
-                             ToneResponse(tone), estimate_noise(grey, {0, 0, grey.cols, grey.rows})};
-  std::vector<PhotometricFit> fits(measured.size());
-  const auto pattern_of = [&](std::size_t k) -> const MarkerPattern& {
-    return family.patterns[static_cast<std::size_t>(markers[measured[k]].id)];
-  };
-  const bool shared = tone == ToneCurve::srgb || camera == nullptr;
-  tbb::parallel_for(std::size_t{0}, measured.size(), [&](std::size_t k) {
-    const DecodedMarker& marker = markers[measured[k]];
-    const bool free = side_of(marker) >= kSharedSidePx;
-    fits[k] = fit_marker(grey, photograph, pattern_of(k), marker.corners_px, free && tone == ToneCurve::srgb,
-                         free && camera == nullptr);
-  });
-  if (shared) {
-    const Shared found = pool(fits);
-    if (tone == ToneCurve::srgb) photograph.tone = ToneResponse(tone, found[0], found[1]);
-    if (camera == nullptr) photograph.map = PixelMap(grey.cols, grey.rows, LensStandIn{found[2], found[3]});
-    tbb::parallel_for(std::size_t{0}, measured.size(), [&](std::size_t k) {
-      const bool free_lens = camera == nullptr && side_of(markers[measured[k]]) >= kSharedSidePx;
-      if (fits[k].converged) fits[k] = fit_marker_again(grey, photograph, pattern_of(k), fits[k], free_lens);
-    });
-  }
-
-  const ResidualLevel level = residual_level(fits);
+  const std::vector<MarkerObservation> refined = refine_markers(grey, tone, guesses, options.refine, camera);
   for (std::size_t k = 0; k < measured.size(); ++k) {
-    const MarkerObservation before = observations[measured[k]];
-    MarkerObservation& observation = observations[measured[k]];
-    observation = observation_from(fits[k], grey, camera, level, options.refine);
-    observation.id = before.id;
-    if (!fits[k].converged) {
-      observation.corners_px = before.corners_px;
-      observation.side_px = before.side_px;
-    }
+    observations[measured[k]] = refined[k];
+    observations[measured[k]].id = markers[measured[k]].id;
   }
   for (std::size_t i = 0; i + 1 < observations.size(); ++i) {
     if (observations[i].id != observations[i + 1].id) continue;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <opencv2/core/mat.hpp>
+#include <vector>
 
 #include "photogrammetry/camera/camera_model.h"
 #include "photogrammetry/markers/marker.h"
@@ -17,21 +18,28 @@ struct RefineOptions {
   double max_saturated = 0.02;  ///< share of the marker's pixels that clip
   double min_visible = 0.6;     ///< share of the pattern's transitions that the fit used
   double max_chi2_per_dof = 5;  ///< of the photometric fit
+  bool first_look = false;      ///< corners to a few hundredths of a pixel in half the time
 
   /// Throws InputError naming field and value.
   void validate() const;
 };
 
-/// Maximum-likelihood photometric fit of one marker: its pattern, mapped by a homography and the lens (if a
-/// camera is given), blurred, shaded by a linear illumination gradient between free black and white levels
-/// and passed through the tone curve, is fitted to the pixels around the pattern's transitions. `corners_px`
-/// in the order of MarkerObservation, within about 3 px. The result's id is -1; its status says whether it
-/// can be trusted.
-[[nodiscard]] MarkerObservation refine_marker(const cv::Mat& grey, ToneCurve tone,
-                                              const MarkerPattern& pattern,
-                                              const std::array<Eigen::Vector2d, 4>& corners_px,
-                                              const RefineOptions& options = {},
-                                              const CameraModel* camera = nullptr);
+/// Where a marker is thought to be.
+struct MarkerGuess {
+  const MarkerPattern* pattern;
+  std::array<Eigen::Vector2d, 4> corners_px;  ///< in the order of MarkerObservation, within about 3 px
+};
+
+/// Maximum-likelihood photometric fit of a photograph's markers: each pattern, mapped by a homography and the
+/// lens, blurred, shaded by an illumination gradient between free black and white levels and passed through
+/// the tone curve, is fitted to the pixels around the pattern's transitions. The tone curve, the noise and,
+/// without a camera, a common radial distortion are the photograph's and told by all its markers together.
+/// The results stand in the order of the guesses, their ids are -1, and their status says whether they can be
+/// trusted. Runs in the caller's TBB arena; the result does not depend on the number of threads.
+[[nodiscard]] std::vector<MarkerObservation> refine_markers(const cv::Mat& grey, ToneCurve tone,
+                                                            const std::vector<MarkerGuess>& guesses,
+                                                            const RefineOptions& options = {},
+                                                            const CameraModel* camera = nullptr);
 
 /// A point measured in a photograph.
 struct PointObservation {

@@ -57,9 +57,9 @@ void refine(benchmark::State& state) {
   std::size_t at = 0;
   for (auto _ : state) {
     const MarkerObservation& marker = markers.at(at);
-    benchmark::DoNotOptimize(refine_marker(photograph().grey, photograph().tone,
-                                           family.patterns[static_cast<std::size_t>(marker.id)],
-                                           marker.corners_px, {}, camera ? &camera->model : nullptr));
+    const MarkerGuess guess{&family.patterns[static_cast<std::size_t>(marker.id)], marker.corners_px};
+    benchmark::DoNotOptimize(
+        refine_markers(photograph().grey, photograph().tone, {guess}, {}, camera ? &camera->model : nullptr));
     at = (at + 1) % markers.size();
   }
 }
