@@ -18,6 +18,13 @@ namespace hexcal {
 namespace {
 
 constexpr double kFrameMarginPx = 3;
+constexpr int kPixelsOfRoughLook = 2000;  // a third of what a marker is measured with in the end
+
+RefineOptions rough_look() {
+  RefineOptions options;
+  options.max_pixels = kPixelsOfRoughLook;
+  return options;
+}
 
 FeatureObservation from_point(const PointObservation& point, int sheet, int first_point) {
   FeatureObservation feature;
@@ -184,9 +191,8 @@ void detect_family(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>
       first += 4;
     }
   }
-  DetectionOptions only_roughly;
-  only_roughly.refine.first_look = true;
-  for (const MarkerObservation& marker : detect_markers(grey, tone, marker_family(family), only_roughly)) {
+  for (const MarkerObservation& marker :
+       detect_markers(grey, tone, marker_family(family), {{}, rough_look()})) {
     const auto place = places.find(marker.id);
     if (place == places.end()) {
       if (marker.status == MarkerStatus::ok) out.foreign_ids.push_back(marker.id);
@@ -231,6 +237,21 @@ void prefer_saddles(const std::vector<Sheet>& sheets, std::vector<FeatureObserva
   }
 }
 
+// Features with the markers at the guesses measured in place of those that were there.
+SheetMeasurement with_markers(const cv::Mat& grey, const std::vector<Sheet>& sheets,
+                              const CameraModel& camera, const RefineOptions& options, SheetMeasurement out) {
+  RefinedMarkers refined = refine_markers(grey, out.tone, out.guesses, options, &camera);
+  std::erase_if(out.features, [](const FeatureObservation& feature) { return feature.points() == 4; });
+  for (std::size_t k = 0; k < refined.markers.size(); ++k) {
+    out.features.push_back(feature_of_marker(refined.markers[k], out.places[k].first, out.places[k].second));
+  }
+  out.guesses = std::move(refined.guesses);
+  out.tone = refined.tone;
+  prefer_saddles(sheets, out.features);
+  sort_features(out.features);
+  return out;
+}
+
 }  // namespace
 
 FeatureObservation feature_of_marker(const MarkerObservation& marker, int sheet, int first_point) {
@@ -270,14 +291,11 @@ SheetDetection detect_sheets(const cv::Mat& grey, ToneCurve tone, const std::vec
   return out;
 }
 
-std::vector<FeatureObservation> refine_sheets(const cv::Mat& grey, ToneCurve tone,
-                                              const std::vector<Sheet>& sheets,
-                                              const std::vector<SheetShape>& shapes,
-                                              const CameraModel& camera,
-                                              const std::vector<SheetView>& views) {
-  std::vector<FeatureObservation> out;
-  std::vector<MarkerGuess> guesses;
-  std::vector<std::pair<int, int>> places;  // of the guesses: sheet, first point
+SheetMeasurement measure_sheets(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>& sheets,
+                                const std::vector<SheetShape>& shapes, const CameraModel& camera,
+                                const std::vector<SheetView>& views) {
+  SheetMeasurement out;
+  out.tone = ToneResponse(tone);
   for (const SheetView& view : views) {
     const Sheet& sheet = sheets[static_cast<std::size_t>(view.sheet)];
     const PredictedSheet predicted(sheet, shapes[static_cast<std::size_t>(view.sheet)], camera,
@@ -292,19 +310,18 @@ std::vector<FeatureObservation> refine_sheets(const cv::Mat& grey, ToneCurve ton
         if (px) guess.corners_px[i] = *px;
       }
       if (!in_frame) continue;
-      guesses.push_back(guess);
-      places.emplace_back(view.sheet, 4 * static_cast<int>(m));
+      out.guesses.push_back(guess);
+      out.places.emplace_back(view.sheet, 4 * static_cast<int>(m));
     }
-    measure_saddles(grey, tone, predicted, view.sheet, sheet, out);
-    measure_dots(grey, predicted, view.sheet, out);
+    measure_saddles(grey, tone, predicted, view.sheet, sheet, out.features);
+    measure_dots(grey, predicted, view.sheet, out.features);
   }
-  const std::vector<MarkerObservation> refined = refine_markers(grey, tone, guesses, {}, &camera);
-  for (std::size_t k = 0; k < refined.size(); ++k) {
-    out.push_back(feature_of_marker(refined[k], places[k].first, places[k].second));
-  }
-  prefer_saddles(sheets, out);
-  sort_features(out);
-  return out;
+  return with_markers(grey, sheets, camera, rough_look(), std::move(out));
+}
+
+SheetMeasurement with_markers_measured(const cv::Mat& grey, const std::vector<Sheet>& sheets,
+                                       const CameraModel& camera, SheetMeasurement before) {
+  return with_markers(grey, sheets, camera, {}, std::move(before));
 }
 
 }  // namespace hexcal

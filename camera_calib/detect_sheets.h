@@ -2,10 +2,12 @@
 
 #include <opencv2/core/mat.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "camera_calib/sheet_adjustment.h"
 #include "camera_calib/sheet_observation.h"
+#include "photogrammetry/markers/refine.h"
 #include "photogrammetry/photograph/photograph.h"
 
 namespace hexcal {
@@ -27,12 +29,23 @@ struct SheetDetection {
 [[nodiscard]] SheetDetection detect_sheets(const cv::Mat& grey, ToneCurve tone,
                                            const std::vector<Sheet>& sheets);
 
-/// Measures again, now with the camera's lens inside the photometric model and at every place where the views
-/// predict a feature, found before or not.
-[[nodiscard]] std::vector<FeatureObservation> refine_sheets(const cv::Mat& grey, ToneCurve tone,
-                                                            const std::vector<Sheet>& sheets,
-                                                            const std::vector<SheetShape>& shapes,
-                                                            const CameraModel& camera,
-                                                            const std::vector<SheetView>& views);
+/// A photograph's features, and the start for measuring its markers again through another lens.
+struct SheetMeasurement {
+  std::vector<FeatureObservation> features;  ///< as SheetDetection has them
+  std::vector<MarkerGuess> guesses;
+  std::vector<std::pair<int, int>> places;  ///< of the guesses: sheet, first point
+  ToneResponse tone{ToneCurve::srgb};
+};
+
+/// Measures at every place where the views predict a feature, found before or not, with the camera's lens
+/// inside the photometric model; markers only roughly.
+[[nodiscard]] SheetMeasurement measure_sheets(const cv::Mat& grey, ToneCurve tone,
+                                              const std::vector<Sheet>& sheets,
+                                              const std::vector<SheetShape>& shapes,
+                                              const CameraModel& camera, const std::vector<SheetView>& views);
+
+/// The same markers as well as they can be, through the lens of `camera`.
+[[nodiscard]] SheetMeasurement with_markers_measured(const cv::Mat& grey, const std::vector<Sheet>& sheets,
+                                                     const CameraModel& camera, SheetMeasurement before);
 
 }  // namespace hexcal

@@ -106,28 +106,31 @@ void leave_out_other_settings(std::vector<SheetPhotograph>& photographs) {
   }
 }
 
-// Measures the photographs that `wanted` names, with the state's lens in the photometric model and at every
-// place where the state's views predict a feature.
-template <typename Wanted>
-void measure_again(const std::vector<Sheet>& sheets, const Pixels& pixels, const CalibrationState& state,
-                   const Wanted& wanted, std::vector<SheetPhotograph>& photographs) {
-  tbb::parallel_for(std::size_t{0}, photographs.size(), [&](std::size_t i) {
+// Each photograph's features at the places that the rough camera's views predict, through its lens.
+std::vector<SheetMeasurement> measure_at_views(const std::vector<Sheet>& sheets, const Pixels& pixels,
+                                               const CalibrationState& rough, std::size_t photographs,
+                                               const std::function<void()>& on_photograph) {
+  std::vector<SheetMeasurement> out(photographs);
+  tbb::parallel_for(std::size_t{0}, photographs, [&](std::size_t i) {
     std::vector<SheetView> views;
-    for (const SheetView& view : state.views) {
+    for (const SheetView& view : rough.views) {
       if (view.photograph == static_cast<int>(i)) views.push_back(view);
     }
-    if (views.empty() || !wanted(i)) return;
-    const Photograph photograph = pixels.get(i);
-    photographs[i].features =
-        refine_sheets(photograph.grey, photograph.tone, sheets, state.shapes, state.camera, views);
+    if (!views.empty()) {
+      const Photograph photograph = pixels.get(i);
+      out[i] = measure_sheets(photograph.grey, photograph.tone, sheets, rough.shapes, rough.camera, views);
+    }
+    if (on_photograph) on_photograph();
   });
+  return out;
 }
 
 // A lens that was known only roughly bends corners where markers are large in the frame: with a camera from
-// all corners, photographs whose markers it bends otherwise are measured again.
-void remeasure(const std::vector<Sheet>& sheets, const Pixels& pixels, CalibrationState state,
-               double sigma_px, std::vector<SheetPhotograph>& photographs) {
-  constexpr int kRounds = 2;
+// all corners the markers are measured again, until no lens bends them otherwise.
+void measure_markers(const std::vector<Sheet>& sheets, const Pixels& pixels, CalibrationState state,
+                     double sigma_px, std::vector<SheetMeasurement>& measured,
+                     std::vector<SheetPhotograph>& photographs) {
+  constexpr int kRounds = 3;
   const CameraVariant variant{LensModel::radial, all_but_affinity(LensModel::radial), BoardFreedom::warped};
   for (int round = 0; round < kRounds; ++round) {
     const CameraModel before = state.camera;
@@ -137,14 +140,13 @@ void remeasure(const std::vector<Sheet>& sheets, const Pixels& pixels, Calibrati
     state = fit.adjustment.state;
     sigma_px = std::max(fit.extra_sigma_px, kLeastRoughSigmaPx);
     std::atomic<int> count = 0;
-    measure_again(
-        sheets, pixels, state,
-        [&](std::size_t i) {
-          const bool bent = bent_otherwise(photographs[i].features, before, state.camera);
-          count += bent ? 1 : 0;
-          return bent;
-        },
-        photographs);
+    tbb::parallel_for(std::size_t{0}, photographs.size(), [&](std::size_t i) {
+      if (measured[i].guesses.empty()) return;
+      if (round > 0 && !bent_otherwise(measured[i].features, before, state.camera)) return;
+      measured[i] = with_markers_measured(pixels.get(i).grey, sheets, state.camera, std::move(measured[i]));
+      photographs[i].features = measured[i].features;
+      ++count;
+    });
     if (count == 0) return;
   }
 }
@@ -175,15 +177,13 @@ MeasuredCamera measure_camera(const std::vector<fs::path>& paths, const std::vec
   out.calibration = rough_calibration(sheets, out.photographs, options);
   if (out.calibration.status != CalibrationStatus::ok) return out;
   const CalibrationState& rough = out.calibration.fit.adjustment.state;
-  measure_again(
-      sheets, pixels, rough,
-      [&](std::size_t) {
-        if (on_photograph) on_photograph();
-        return true;
-      },
-      out.photographs);
+  std::vector<SheetMeasurement> measured =
+      measure_at_views(sheets, pixels, rough, paths.size(), on_photograph);
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    if (!measured[i].features.empty()) out.photographs[i].features = measured[i].features;
+  }
   const double sigma_px = std::max(out.calibration.fit.extra_sigma_px, kLeastRoughSigmaPx);
-  remeasure(sheets, pixels, rough, sigma_px, out.photographs);
+  measure_markers(sheets, pixels, rough, sigma_px, measured, out.photographs);
   out.calibration = calibrate_camera(sheets, with_features(rough, out.photographs), sigma_px, options);
   out.setting = common_setting(out.photographs, out.calibration);
   return out;

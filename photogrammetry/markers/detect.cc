@@ -133,9 +133,9 @@ std::vector<MarkerObservation> detect_markers(const cv::Mat& grey, ToneCurve ton
     measured.push_back(i);
     guesses.push_back({&family.patterns[static_cast<std::size_t>(markers[i].id)], markers[i].corners_px});
   }
-  const std::vector<MarkerObservation> refined = refine_markers(grey, tone, guesses, options.refine, camera);
+  const RefinedMarkers refined = refine_markers(grey, ToneResponse(tone), guesses, options.refine, camera);
   for (std::size_t k = 0; k < measured.size(); ++k) {
-    observations[measured[k]] = refined[k];
+    observations[measured[k]] = refined.markers[k];
     observations[measured[k]].id = markers[measured[k]].id;
   }
   for (std::size_t i = 0; i + 1 < observations.size(); ++i) {

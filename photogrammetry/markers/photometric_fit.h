@@ -8,7 +8,7 @@
 #include "photogrammetry/markers/blurred_pattern.h"
 #include "photogrammetry/markers/image_noise.h"
 #include "photogrammetry/markers/pixel_map.h"
-#include "photogrammetry/photograph/tone_response.h"
+#include "photogrammetry/markers/refine.h"
 
 namespace hexcal {
 
@@ -22,10 +22,6 @@ struct PhotographModel {
 /// Parameters of the photograph that one marker's fit may estimate: the tone curve's two, the lens stand-in's
 /// two.
 constexpr int kNumShared = 4;
-
-struct FitStart {
-  double blur_px, black, white;
-};
 
 struct FitRequest {
   BlurredPattern pattern;

@@ -91,11 +91,11 @@ MarkerStatus verdict(const PhotometricFit& fit, const MarkerObservation& marker,
 // From approximate corners to a fit: edges first, then the photometric fit.
 PhotometricFit fit_marker(const cv::Mat& grey, const PhotographModel& photograph,
                           const MarkerPattern& pattern, const std::array<Eigen::Vector2d, 4>& corners_px,
-                          bool free_tone, bool free_lens) {
+                          bool free_tone, bool free_lens, int max_pixels) {
   FitRequest request{BlurredPattern(pattern), pattern.square_cells, corners_px};
   request.free_tone = free_tone;
   request.free_lens = free_lens;
-  if (free_tone || free_lens) request.max_pixels = kPixelsOfFirstLook;
+  request.max_pixels = free_tone || free_lens ? std::min(kPixelsOfFirstLook, max_pixels) : max_pixels;
   if (const auto scanned =
           scan_edges(grey, photograph.tone, request.pattern, pattern.square_cells, corners_px)) {
     request.corners_px = *scanned;
@@ -106,12 +106,17 @@ PhotometricFit fit_marker(const cv::Mat& grey, const PhotographModel& photograph
 // The same marker again, from its fit with an earlier model of the photograph. With `free_lens` the marker's
 // own curvature may differ a little from that of the photograph's lens stand-in.
 PhotometricFit fit_marker_again(const cv::Mat& grey, const PhotographModel& photograph,
-                                const MarkerPattern& pattern, const PhotometricFit& before, bool free_lens) {
-  FitRequest request{BlurredPattern(pattern), pattern.square_cells, before.corners_px};
+                                const MarkerGuess& guess, bool free_lens, int max_pixels) {
+  FitRequest request{BlurredPattern(*guess.pattern), guess.pattern->square_cells, guess.corners_px};
   request.free_lens = free_lens;
   request.lens_sigma = kLensSigma;
-  request.start = FitStart{before.blur_px, before.black, before.white};
+  request.max_pixels = max_pixels;
+  request.start = guess.start;
   return fit_pattern(grey, photograph, request);
+}
+
+MarkerGuess guess_from(const MarkerGuess& before, const PhotometricFit& fit) {
+  return {before.pattern, fit.corners_px, FitStart{fit.blur_px, fit.black, fit.white}};
 }
 
 // All markers' evidence about the tone curve and the lens stand-in together (their fits' Schur complements).
@@ -186,41 +191,50 @@ void RefineOptions::validate() const {
   check("max_saturated", max_saturated, 0, 1);
   check("min_visible", min_visible, 0, 1);
   check("max_chi2_per_dof", max_chi2_per_dof, 1, 1e9);
+  check("max_pixels", max_pixels, 500, 1e9);
 }
 
-std::vector<MarkerObservation> refine_markers(const cv::Mat& grey, ToneCurve tone,
-                                              const std::vector<MarkerGuess>& guesses,
-                                              const RefineOptions& options, const CameraModel* camera) {
+RefinedMarkers refine_markers(const cv::Mat& grey, const ToneResponse& tone,
+                              const std::vector<MarkerGuess>& guesses, const RefineOptions& options,
+                              const CameraModel* camera) {
   options.validate();
-  if (guesses.empty()) return {};
-  PhotographModel photograph{camera != nullptr ? PixelMap(*camera) : PixelMap(grey.cols, grey.rows, {}),
-                             ToneResponse(tone), estimate_noise(grey, {0, 0, grey.cols, grey.rows})};
+  RefinedMarkers out{{}, tone, guesses};
+  if (guesses.empty()) return out;
+  PhotographModel photograph{camera != nullptr ? PixelMap(*camera) : PixelMap(grey.cols, grey.rows, {}), tone,
+                             estimate_noise(grey, {0, 0, grey.cols, grey.rows})};
   std::vector<PhotometricFit> fits(guesses.size());
-  const bool free_tone = tone == ToneCurve::srgb;
+  const bool free_tone = tone.nominal() == ToneCurve::srgb;
   const bool free_lens = camera == nullptr;
   const auto tells_shared = [&guesses](std::size_t k) {
     return mean_side(guesses[k].corners_px) >= kSharedSidePx;
   };
   tbb::parallel_for(std::size_t{0}, guesses.size(), [&](std::size_t k) {
+    if (guesses[k].start) return;
     fits[k] = fit_marker(grey, photograph, *guesses[k].pattern, guesses[k].corners_px,
-                         free_tone && tells_shared(k), free_lens && tells_shared(k));
+                         free_tone && tells_shared(k), free_lens && tells_shared(k), options.max_pixels);
   });
-  if ((free_tone || free_lens) && !options.first_look) {
+  const bool is_new = std::any_of(fits.begin(), fits.end(), [](const auto& fit) { return fit.converged; });
+  if (is_new && (free_tone || free_lens)) {
     const Shared found = pool(fits);
-    if (free_tone) photograph.tone = ToneResponse(tone, found[0], found[1]);
+    if (free_tone) photograph.tone = ToneResponse(tone.nominal(), found[0], found[1]);
     if (free_lens) photograph.map = PixelMap(grey.cols, grey.rows, LensStandIn{found[2], found[3]});
-    tbb::parallel_for(std::size_t{0}, guesses.size(), [&](std::size_t k) {
-      if (!fits[k].converged) return;
-      fits[k] =
-          fit_marker_again(grey, photograph, *guesses[k].pattern, fits[k], free_lens && tells_shared(k));
-    });
   }
+  const bool look_again = free_lens || (free_tone && options.max_pixels > kPixelsOfFirstLook);
+  tbb::parallel_for(std::size_t{0}, guesses.size(), [&](std::size_t k) {
+    MarkerGuess& guess = out.guesses[k];
+    const bool lens_may_differ = free_lens && tells_shared(k);
+    if (fits[k].converged) guess = guess_from(guess, fits[k]);
+    if (guess.start && (guesses[k].start || look_again)) {
+      fits[k] = fit_marker_again(grey, photograph, guess, lens_may_differ, options.max_pixels);
+      guess = fits[k].converged ? guess_from(guess, fits[k]) : guesses[k];
+    }
+  });
+  out.tone = photograph.tone;
   const ResidualLevel level = residual_level(fits);
-  std::vector<MarkerObservation> observations;
   for (std::size_t k = 0; k < guesses.size(); ++k) {
-    observations.push_back(observation_from(fits[k], guesses[k].corners_px, grey, camera, level, options));
+    out.markers.push_back(observation_from(fits[k], guesses[k].corners_px, grey, camera, level, options));
   }
-  return observations;
+  return out;
 }
 
 }  // namespace hexcal

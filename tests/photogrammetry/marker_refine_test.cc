@@ -47,7 +47,8 @@ TEST_P(RefineMarkerWithoutNoise, IsExactToRounding) {
   const MarkerPattern& pattern = marker_family("tag36h11").patterns[17];
   const cv::Mat grey = render_image(image, {flat_marker(pattern, square)});
   const MarkerObservation marker =
-      refine_markers(grey, ToneCurve::srgb, {{&pattern, moved(square_corners(square), 1.0)}}).front();
+      refine_markers(grey, ToneResponse(ToneCurve::srgb), {{&pattern, moved(square_corners(square), 1.0)}})
+          .markers.front();
   EXPECT_EQ(marker.status, MarkerStatus::ok);
   EXPECT_LT(rms_error(marker, square_corners(square)), view.budget_px);
   EXPECT_NEAR(marker.blur_px, view.blur_px, 0.02);
@@ -62,7 +63,8 @@ TEST(RefineMarker, RefusesWhatIsNoMarker) {
   const MarkerPattern& pattern = marker_family("tag36h11").patterns[0];
   const std::array<Eigen::Vector2d, 4> corners{Eigen::Vector2d(50, 50), Eigen::Vector2d(150, 50),
                                                Eigen::Vector2d(150, 150), Eigen::Vector2d(50, 150)};
-  const MarkerObservation marker = refine_markers(grey, ToneCurve::srgb, {{&pattern, corners}}).front();
+  const MarkerObservation marker =
+      refine_markers(grey, ToneResponse(ToneCurve::srgb), {{&pattern, corners}}).markers.front();
   EXPECT_NE(marker.status, MarkerStatus::ok);
 }
 

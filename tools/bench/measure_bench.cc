@@ -58,8 +58,8 @@ void refine(benchmark::State& state) {
   for (auto _ : state) {
     const MarkerObservation& marker = markers.at(at);
     const MarkerGuess guess{&family.patterns[static_cast<std::size_t>(marker.id)], marker.corners_px};
-    benchmark::DoNotOptimize(
-        refine_markers(photograph().grey, photograph().tone, {guess}, {}, camera ? &camera->model : nullptr));
+    benchmark::DoNotOptimize(refine_markers(photograph().grey, ToneResponse(photograph().tone), {guess}, {},
+                                            camera ? &camera->model : nullptr));
     at = (at + 1) % markers.size();
   }
 }
