@@ -37,6 +37,18 @@ std::vector<CameraVariant> with_board(std::vector<CameraVariant> variants, Board
   return variants;
 }
 
+// Lenses that need not be tried again with another freedom of the sheets are left out.
+std::vector<CameraVariant> hopeful(const std::vector<ModelTrial>& trials) {
+  constexpr double kHopeless = 2;  // times the best one's error of prediction
+  double best = std::numeric_limits<double>::infinity();
+  for (const ModelTrial& trial : trials) best = std::min(best, trial.cross_validation_px.value_or(best));
+  std::vector<CameraVariant> out;
+  for (const ModelTrial& trial : trials) {
+    if (trial.cross_validation_px.value_or(0) <= kHopeless * best) out.push_back(trial.variant);
+  }
+  return out;
+}
+
 // Each sheet's points seen by enough photographs to be freed.
 bool points_can_be_free(const CalibrationState& state) { return photographs_in(state) >= 5; }
 
@@ -156,7 +168,7 @@ CameraCalibration calibrate_camera(const std::vector<Sheet>& sheets, const Calib
         state = again.adjustment.state;
         sigma = again.extra_sigma_px;
       }
-      trials = try_variants(sheets, state, sigma, with_board(lens_variants(options.lens), variant.board));
+      trials = try_variants(sheets, state, sigma, with_board(hopeful(lens_trials), variant.board));
       variant = trials[choose_trial(trials)].variant;
       for (const ModelTrial& trial : trials) out.trials.push_back(trial);
     }

@@ -133,6 +133,7 @@ bool BlurredPattern::has_transition(double x, double y, double reach_x, double r
   const int right = cell_of(x + reach_x);
   const int top = cell_of(y - reach_y);
   const int bottom = cell_of(y + reach_y);
+  if (left == right && top == bottom) return false;
   const double first = cell(left, top);
   for (int row = top; row <= bottom; ++row) {
     for (int column = left; column <= right; ++column) {

@@ -478,14 +478,19 @@ class MarkerFit {
   // Fit quality, and the score's covariance summed by blocks (White 1980, clustered): residuals of
   // neighbouring pixels are not independent after JPEG or where the model misfits.
   void measure_residuals(PhotometricFit& fit, const Eigen::MatrixXd& covariance, int geometry) const {
-    struct Score {
-      int pixels = 0;
-      Vector sum = Vector::Zero();
+    const auto count = static_cast<Eigen::Index>(active_list_.size());
+    const Eigen::MatrixXd geometry_rows = covariance.topRows(geometry);
+    const Eigen::MatrixXd information = covariance.topLeftCorner(geometry, geometry).inverse();
+    double clustered = 0;
+    double blocks = 0;
+    Vector score;  // of the block at hand: pixels come block by block
+    int block = -1;
+    const auto end_block = [&] {
+      if (block < 0) return;
+      const Eigen::VectorXd shift = geometry_rows * score.head(count);
+      clustered += shift.dot(information * shift);
+      blocks += 1;
     };
-    int last_block = 0;
-    for (const FitPixel& pixel : selected_.pixels) last_block = std::max(last_block, pixel.block);
-    std::vector<Score> scores(static_cast<std::size_t>(last_block) + 1);
-    const std::size_t size = active_list_.size();
     double sum = 0;
     double used = 0;
     int agreeing = 0;
@@ -497,13 +502,15 @@ class MarkerFit {
       const double robust = robust_weight(i);
       sum += robust * residual * residual;
       used += 1;
-      Score& score = scores[static_cast<std::size_t>(pixel.block)];
-      ++score.pixels;
-      const double* const row = rows_.data() + i * size;
-      for (std::size_t k = 0; k < size; ++k) {
-        score.sum[static_cast<int>(k)] += row[k] * residual * robust;
+      if (pixel.block != block) {
+        end_block();
+        block = pixel.block;
+        score.setZero();
       }
+      score.head(count) += residual * robust *
+                           Eigen::Map<const Eigen::VectorXd>(rows_.data() + i * active_list_.size(), count);
     }
+    end_block();
     const double free = std::max(used - static_cast<double>(active_list_.size()), 1.0);
     fit.pixels = static_cast<int>(used);
     fit.chi2_per_dof = sum / free;
@@ -511,17 +518,6 @@ class MarkerFit {
     fit.saturated =
         selected_.clipped / std::max(1.0, static_cast<double>(selected_.pixels.size() +
                                                               static_cast<std::size_t>(selected_.clipped)));
-    const auto count = static_cast<Eigen::Index>(active_list_.size());
-    const Eigen::MatrixXd geometry_rows = covariance.topRows(geometry);
-    const Eigen::MatrixXd information = covariance.topLeftCorner(geometry, geometry).inverse();
-    double clustered = 0;
-    double blocks = 0;
-    for (const Score& score : scores) {
-      if (score.pixels == 0) continue;
-      const Eigen::VectorXd shift = geometry_rows * score.sum.head(count);
-      clustered += shift.dot(information * shift);
-      blocks += 1;
-    }
     const double unbiased = blocks > geometry + 1 ? blocks / (blocks - geometry) : 1;
     fit.covariance_factor = std::max(clustered / geometry * unbiased, 1e-12);
   }
