@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "camera_calib/detect_sheets.h"
 #include "camera_calib/initial_camera.h"
 
 namespace hexcal {
@@ -13,15 +14,10 @@ namespace {
 // An error that all photographs share does not average out.
 constexpr double kShareOfSigma = 0.1;
 
-std::array<Eigen::Vector2d, 4> corners_of(const FeatureObservation& feature) {
-  return {feature.px.segment<2>(0), feature.px.segment<2>(2), feature.px.segment<2>(4),
-          feature.px.segment<2>(6)};
-}
-
 // Largest distance that stays between the two lenses' ideal images of a marker after the best homography, px.
 double bent_px(const FeatureObservation& feature, const CameraModel& before, const CameraModel& after) {
   constexpr int kSide = 5;
-  const auto corners = corners_of(feature);
+  const auto corners = marker_corners(feature);
   std::vector<Eigen::Vector2d> from;
   std::vector<Eigen::Vector2d> to;
   for (int i = 0; i < kSide; ++i) {

@@ -18,7 +18,7 @@ namespace hexcal {
 namespace {
 
 constexpr double kFrameMarginPx = 3;
-constexpr int kPixelsOfRoughLook = 2000;  // a third of what a marker is measured with in the end
+constexpr int kPixelsOfRoughLook = 1000;  // a sixth of what a marker is measured with in the end
 
 RefineOptions rough_look() {
   RefineOptions options;
@@ -237,6 +237,25 @@ void prefer_saddles(const std::vector<Sheet>& sheets, std::vector<FeatureObserva
   }
 }
 
+// Where a marker was detected or, if it was not, where it is predicted; none if that is not wholly in the
+// frame.
+std::optional<MarkerGuess> guess_at(const MarkerPattern& pattern, const PredictedSheet& predicted,
+                                    int first_point, const SheetView& view) {
+  MarkerGuess guess{&pattern, {}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto px = predicted.at(predicted.points_mm()[static_cast<std::size_t>(first_point) + i]);
+    if (!px) return std::nullopt;
+    guess.corners_px[i] = *px;
+  }
+  for (std::size_t f = 0; f < view.features.size(); ++f) {
+    const FeatureObservation& found = view.features[f];
+    if (found.first_point != first_point || found.points() != 4 || view.rejected[f] != 0) continue;
+    guess.corners_px = marker_corners(found);
+    guess.blur_px = found.blur_px;
+  }
+  return guess;
+}
+
 // Features with the markers at the guesses measured in place of those that were there.
 SheetMeasurement with_markers(const cv::Mat& grey, const std::vector<Sheet>& sheets,
                               const CameraModel& camera, const RefineOptions& options, SheetMeasurement out) {
@@ -267,6 +286,11 @@ FeatureObservation feature_of_marker(const MarkerObservation& marker, int sheet,
   feature.blur_px = marker.blur_px;
   feature.chi2_per_dof = marker.chi2_per_dof;
   return feature;
+}
+
+std::array<Eigen::Vector2d, 4> marker_corners(const FeatureObservation& feature) {
+  return {feature.px.segment<2>(0), feature.px.segment<2>(2), feature.px.segment<2>(4),
+          feature.px.segment<2>(6)};
 }
 
 SheetDetection detect_sheets(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>& sheets) {
@@ -302,16 +326,13 @@ SheetMeasurement measure_sheets(const cv::Mat& grey, ToneCurve tone, const std::
                                    view.camera_from_sheet);
     const std::vector<SheetMarker>& markers = predicted.geometry().markers;
     for (std::size_t m = 0; m < markers.size(); ++m) {
-      MarkerGuess guess{&marker_family(sheet.family).patterns[static_cast<std::size_t>(markers[m].id)], {}};
-      bool in_frame = true;
-      for (std::size_t i = 0; in_frame && i < 4; ++i) {
-        const auto px = predicted.at(predicted.points_mm()[4 * m + i]);
-        in_frame = px.has_value();
-        if (px) guess.corners_px[i] = *px;
-      }
-      if (!in_frame) continue;
-      out.guesses.push_back(guess);
-      out.places.emplace_back(view.sheet, 4 * static_cast<int>(m));
+      const int first_point = 4 * static_cast<int>(m);
+      const auto guess =
+          guess_at(marker_family(sheet.family).patterns[static_cast<std::size_t>(markers[m].id)], predicted,
+                   first_point, view);
+      if (!guess) continue;
+      out.guesses.push_back(*guess);
+      out.places.emplace_back(view.sheet, first_point);
     }
     measure_saddles(grey, tone, predicted, view.sheet, sheet, out.features);
     measure_dots(grey, predicted, view.sheet, out.features);

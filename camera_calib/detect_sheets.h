@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <opencv2/core/mat.hpp>
 #include <string>
 #include <utility>
@@ -15,6 +16,7 @@ namespace hexcal {
 /// Corners of a marker as a feature.
 [[nodiscard]] FeatureObservation feature_of_marker(const MarkerObservation& marker, int sheet,
                                                    int first_point);
+[[nodiscard]] std::array<Eigen::Vector2d, 4> marker_corners(const FeatureObservation& feature);
 
 struct SheetDetection {
   std::vector<FeatureObservation>
@@ -37,8 +39,8 @@ struct SheetMeasurement {
   ToneResponse tone{ToneCurve::srgb};
 };
 
-/// Measures at every place where the views predict a feature, found before or not, with the camera's lens
-/// inside the photometric model; markers only roughly.
+/// Measures at every place where the views, which hold what was detected, predict a feature, with the
+/// camera's lens inside the photometric model; markers only roughly.
 [[nodiscard]] SheetMeasurement measure_sheets(const cv::Mat& grey, ToneCurve tone,
                                               const std::vector<Sheet>& sheets,
                                               const std::vector<SheetShape>& shapes,

@@ -56,10 +56,8 @@ class MarkerFit {
     activate({kBlur, 1}, true);
     activate({kBlack, 2}, true);
     activate({kLight, 2}, true);
-    if (request_.start) {
-      parameters_[kBlur] = std::max(request_.start->blur_px * request_.start->blur_px, kMinBlur);
-      parameters_[kBlack] = request_.start->black;
-      parameters_[kWhite] = request_.start->white;
+    if (request_.blur_px) {
+      parameters_[kBlur] = std::max(*request_.blur_px * *request_.blur_px, kMinBlur);
     } else {
       select(3.6 * spread_px() + 1.5, kCoarsePixels);
       list_active();
@@ -74,7 +72,7 @@ class MarkerFit {
     activate({kShared + 2, 2}, request_.free_lens);
     select(kFineReachSigmas * spread_px() + 0.3, request_.max_pixels);
     list_active();
-    if (!enough_pixels()) return fit;
+    if (!enough_pixels() || (request_.blur_px && !set_levels())) return fit;
     evaluate_all();
     if (request_.pattern.cells() > 2) drop_covered_cells();
     scale_ = robust_scale();
@@ -142,11 +140,13 @@ class MarkerFit {
 
   double spread_px() const { return std::sqrt(parameters_[kBlur] + kPixelVariance); }
 
-  // Black and white by linear least squares in linear light.
+  // Black and white by linear least squares in linear light, from some of the pixels.
   bool set_levels() {
     Eigen::Matrix2d n = Eigen::Matrix2d::Zero();
     Eigen::Vector2d rhs = Eigen::Vector2d::Zero();
-    for (const FitPixel& pixel : selected_.pixels) {
+    const std::size_t step = selected_.pixels.size() / kCoarsePixels + 1;
+    for (std::size_t i = 0; i < selected_.pixels.size(); i += step) {
+      const FitPixel& pixel = selected_.pixels[i];
       const double share = sample(pixel).pattern.value;
       const Eigen::Vector2d row(1 - share, share);
       n += row * row.transpose();

@@ -8,7 +8,7 @@
 #include "photogrammetry/markers/blurred_pattern.h"
 #include "photogrammetry/markers/image_noise.h"
 #include "photogrammetry/markers/pixel_map.h"
-#include "photogrammetry/markers/refine.h"
+#include "photogrammetry/photograph/tone_response.h"
 
 namespace hexcal {
 
@@ -35,7 +35,7 @@ struct FitRequest {
   double window_cells = 1e9;
   int max_pixels = 6000;  ///< more are thinned
   /// From an earlier fit whose corners these are: the coarse stage is left out.
-  std::optional<FitStart> start = std::nullopt;
+  std::optional<double> blur_px = std::nullopt;
 };
 
 struct PhotometricFit {

@@ -19,23 +19,18 @@ struct RefineOptions {
   double max_saturated = 0.02;  ///< share of the marker's pixels that clip
   double min_visible = 0.6;     ///< share of the pattern's transitions that the fit used
   double max_chi2_per_dof = 5;  ///< of the photometric fit
-  int max_pixels = 6000;  ///< of a marker that its fit uses; more are thinned, and with 2000 or less the
+  int max_pixels = 6000;  ///< of a marker that its fit uses; more are thinned, and with 2000 or fewer the
                           ///< tone curve is each marker's own
 
   /// Throws InputError naming field and value.
   void validate() const;
 };
 
-/// What a marker's fit found besides its corners.
-struct FitStart {
-  double blur_px, black, white;
-};
-
 /// Where a marker is thought to be.
 struct MarkerGuess {
   const MarkerPattern* pattern;
   std::array<Eigen::Vector2d, 4> corners_px;  ///< in the order of MarkerObservation, within about 3 px
-  std::optional<FitStart> start = {};         ///< of an earlier fit, whose corners these are
+  std::optional<double> blur_px = {};         ///< of an earlier measurement, whose corners these are
 };
 
 struct RefinedMarkers {

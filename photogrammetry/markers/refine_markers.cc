@@ -89,15 +89,14 @@ MarkerStatus verdict(const PhotometricFit& fit, const MarkerObservation& marker,
 }
 
 // From approximate corners to a fit: edges first, then the photometric fit.
-PhotometricFit fit_marker(const cv::Mat& grey, const PhotographModel& photograph,
-                          const MarkerPattern& pattern, const std::array<Eigen::Vector2d, 4>& corners_px,
+PhotometricFit fit_marker(const cv::Mat& grey, const PhotographModel& photograph, const MarkerGuess& guess,
                           bool free_tone, bool free_lens, int max_pixels) {
-  FitRequest request{BlurredPattern(pattern), pattern.square_cells, corners_px};
+  FitRequest request{BlurredPattern(*guess.pattern), guess.pattern->square_cells, guess.corners_px};
   request.free_tone = free_tone;
   request.free_lens = free_lens;
   request.max_pixels = free_tone || free_lens ? std::min(kPixelsOfFirstLook, max_pixels) : max_pixels;
   if (const auto scanned =
-          scan_edges(grey, photograph.tone, request.pattern, pattern.square_cells, corners_px)) {
+          scan_edges(grey, photograph.tone, request.pattern, guess.pattern->square_cells, guess.corners_px)) {
     request.corners_px = *scanned;
   }
   return fit_pattern(grey, photograph, request);
@@ -106,17 +105,18 @@ PhotometricFit fit_marker(const cv::Mat& grey, const PhotographModel& photograph
 // The same marker again, from its fit with an earlier model of the photograph. With `free_lens` the marker's
 // own curvature may differ a little from that of the photograph's lens stand-in.
 PhotometricFit fit_marker_again(const cv::Mat& grey, const PhotographModel& photograph,
-                                const MarkerGuess& guess, bool free_lens, int max_pixels) {
+                                const MarkerGuess& guess, bool free_tone, bool free_lens, int max_pixels) {
   FitRequest request{BlurredPattern(*guess.pattern), guess.pattern->square_cells, guess.corners_px};
+  request.free_tone = free_tone;
   request.free_lens = free_lens;
   request.lens_sigma = kLensSigma;
   request.max_pixels = max_pixels;
-  request.start = guess.start;
+  request.blur_px = guess.blur_px;
   return fit_pattern(grey, photograph, request);
 }
 
 MarkerGuess guess_from(const MarkerGuess& before, const PhotometricFit& fit) {
-  return {before.pattern, fit.corners_px, FitStart{fit.blur_px, fit.black, fit.white}};
+  return {before.pattern, fit.corners_px, fit.blur_px};
 }
 
 // All markers' evidence about the tone curve and the lens stand-in together (their fits' Schur complements).
@@ -208,26 +208,32 @@ RefinedMarkers refine_markers(const cv::Mat& grey, const ToneResponse& tone,
   const auto tells_shared = [&guesses](std::size_t k) {
     return mean_side(guesses[k].corners_px) >= kSharedSidePx;
   };
+  // Tone and lens first from each marker by itself, then as all of them say.
+  const bool rough = options.max_pixels <= kPixelsOfFirstLook;
+  const auto first_look = [&](std::size_t k) { return rough || !guesses[k].blur_px; };
   tbb::parallel_for(std::size_t{0}, guesses.size(), [&](std::size_t k) {
-    if (guesses[k].start) return;
-    fits[k] = fit_marker(grey, photograph, *guesses[k].pattern, guesses[k].corners_px,
-                         free_tone && tells_shared(k), free_lens && tells_shared(k), options.max_pixels);
+    const bool with_tone = free_tone && tells_shared(k);
+    const bool with_lens = free_lens && tells_shared(k);
+    if (!first_look(k)) return;
+    fits[k] = guesses[k].blur_px
+                  ? fit_marker_again(grey, photograph, guesses[k], with_tone, with_lens, options.max_pixels)
+                  : fit_marker(grey, photograph, guesses[k], with_tone, with_lens, options.max_pixels);
+    if (fits[k].converged) out.guesses[k] = guess_from(guesses[k], fits[k]);
   });
-  const bool is_new = std::any_of(fits.begin(), fits.end(), [](const auto& fit) { return fit.converged; });
-  if (is_new && (free_tone || free_lens)) {
+  const bool any_new = std::any_of(fits.begin(), fits.end(), [](const auto& fit) { return fit.converged; });
+  if (any_new && (free_tone || free_lens)) {
     const Shared found = pool(fits);
     if (free_tone) photograph.tone = ToneResponse(tone.nominal(), found[0], found[1]);
     if (free_lens) photograph.map = PixelMap(grey.cols, grey.rows, LensStandIn{found[2], found[3]});
   }
-  const bool look_again = free_lens || (free_tone && options.max_pixels > kPixelsOfFirstLook);
+  const bool second_look = free_lens || (free_tone && !rough);
   tbb::parallel_for(std::size_t{0}, guesses.size(), [&](std::size_t k) {
     MarkerGuess& guess = out.guesses[k];
-    const bool lens_may_differ = free_lens && tells_shared(k);
-    if (fits[k].converged) guess = guess_from(guess, fits[k]);
-    if (guess.start && (guesses[k].start || look_again)) {
-      fits[k] = fit_marker_again(grey, photograph, guess, lens_may_differ, options.max_pixels);
-      guess = fits[k].converged ? guess_from(guess, fits[k]) : guesses[k];
-    }
+    if (!guess.blur_px || (first_look(k) && !second_look)) return;
+    fits[k] =
+        fit_marker_again(grey, photograph, guess, false, free_lens && tells_shared(k), options.max_pixels);
+    guess =
+        fits[k].converged ? guess_from(guess, fits[k]) : MarkerGuess{guess.pattern, guesses[k].corners_px};
   });
   out.tone = photograph.tone;
   const ResidualLevel level = residual_level(fits);
