@@ -12,7 +12,7 @@ namespace hexcal {
 namespace {
 
 // An error that all photographs share does not average out.
-constexpr double kShareOfSigma = 0.1;
+constexpr double kShareOfSigma = 0.3;
 
 // Largest distance that stays between the two lenses' ideal images of a marker after the best homography, px.
 double bent_px(const FeatureObservation& feature, const CameraModel& before, const CameraModel& after) {

@@ -9,7 +9,7 @@ namespace hexcal {
 
 /// Whether any of the markers, whose corners were measured through the lens of `before`, would be measured
 /// elsewhere through that of `after`: its image differs between the two by more than a homography can follow
-/// and than a tenth of its corners' sigma.
+/// and than a third of its corners' sigma.
 [[nodiscard]] bool bent_otherwise(const std::vector<FeatureObservation>& features, const CameraModel& before,
                                   const CameraModel& after);
 
