@@ -18,6 +18,7 @@ constexpr double kGoodCorner = 0.1;
 constexpr double kUsableCorner = 0.5;
 constexpr double kBlurred = 1.6;
 constexpr double kFrontalDeg = 10;
+constexpr double kDisagreeing = 3;  // times their noise
 
 class Advisor {
  public:
@@ -141,6 +142,13 @@ class Advisor {
               noise,
               calibration_.variant.board == BoardFreedom::points ? "printed points were free"
                                                                  : "printed points were not free"));
+    }
+    const SharedErrorFactors& shared = calibration_.fit.adjustment.shared_errors;
+    if (shared.photographs > kDisagreeing && shared.photographs == shared.largest()) {
+      add(AdviceLevel::usable,
+          fmt::format("the photographs disagree about the camera {:.0f} times more than their noise, and the "
+                      "sigmas are widened by it: focus, zoom or the sheet changed between them",
+                      shared.photographs));
     }
     int rejected = 0;
     for (const PhotographRow& row : report_.photographs) rejected += row.rejected;
