@@ -9,6 +9,7 @@
 #include "tools/hexcal/terminal.h"
 #include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/sheet_file.h"
 #include "tools/synthetic/campaign_folder.h"
 #include "tools/synthetic/simulation_file.h"
 
@@ -26,6 +27,7 @@ struct SimulateFlags {
   std::string lens = "profile";
   std::optional<double> pose_noise_um;
   std::optional<double> pose_noise_mdeg;
+  fs::path sheet;
   bool no_images = false;
   bool true_camera = false;
 };
@@ -40,6 +42,14 @@ std::uint64_t round_number(const SimulateFlags& flags) {
 int run_simulate(const SimulateFlags& flags) {
   SimulationOptions options = flags.options;
   options.brown_lens = flags.lens == "brown";
+  if (!flags.sheet.empty()) {
+    const std::vector<Sheet> sheets = read_sheet_file(flags.sheet);
+    if (sheets.size() != 1) {
+      throw InputError(fmt::format("{}: holds {} sheets, wanted the one to photograph", flags.sheet.string(),
+                                   sheets.size()));
+    }
+    options.sheet = sheets.front();
+  }
   RoundOptions round;
   round.images = !flags.no_images;
   round.true_camera = flags.true_camera;
@@ -135,6 +145,8 @@ void add_simulate_command(CLI::App& app, Action& action) {
       ->add_option("--compliance-mm-per-n", options.machine.leg_compliance_mm_per_n,
                    "leg shortening under load (not modelled)")
       ->capture_default_str();
+  command->add_option("--sheet", flags->sheet,
+                      "sheet.yaml of the sheet to photograph instead of an AprilGrid of 8 x 6 tags of 40 mm");
   command->add_option("--sheet-scale-x", options.print.scale.x(), "print of the sheet longer by this factor")
       ->capture_default_str();
   command->add_option("--sheet-scale-y", options.print.scale.y(), "the same in y")->capture_default_str();
