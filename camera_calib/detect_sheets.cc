@@ -1,7 +1,11 @@
 #include "camera_calib/detect_sheets.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <set>
 #include <tuple>
@@ -105,20 +109,51 @@ void measure_saddles(const cv::Mat& grey, ToneCurve tone, const PredictedSheet& 
   }
 }
 
-void measure_dots(const cv::Mat& grey, const PredictedSheet& predicted, int sheet,
+// By how much a rim that was fitted as a homography of its circle stands off from the image of the circle's
+// centre, because the lens bends the rim in ways that no homography does, px. The fit moves and grows until
+// the rim's normal distances are least.
+std::optional<Eigen::Vector2d> bent_rim(const PredictedSheet& predicted, const Eigen::Matrix3d& homography,
+                                        const Eigen::Vector3d& centre_mm, double radius_mm) {
+  constexpr int kPoints = 24;
+  const auto by_homography = [&](const Eigen::Vector3d& at) -> Eigen::Vector2d {
+    return (homography * at.head<2>().homogeneous()).hnormalized();
+  };
+  const auto centre = predicted.at(centre_mm);
+  if (!centre) return std::nullopt;
+  Eigen::Matrix3d n = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d rhs = Eigen::Vector3d::Zero();
+  for (int i = 0; i < kPoints; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kPoints;
+    const Eigen::Vector3d radial(std::cos(angle), std::sin(angle), 0);
+    const Eigen::Vector3d tangent(-std::sin(angle), std::cos(angle), 0);
+    const Eigen::Vector3d rim = centre_mm + radius_mm * radial;
+    const auto px = predicted.at(rim);
+    if (!px) return std::nullopt;
+    const Eigen::Vector2d along =
+        by_homography(rim + 0.01 * radius_mm * tangent) - by_homography(rim - 0.01 * radius_mm * tangent);
+    const Eigen::Vector2d normal = Eigen::Vector2d(along.y(), -along.x()).normalized();
+    const double growth = normal.dot(by_homography(rim) - by_homography(centre_mm));
+    const Eigen::Vector3d row(normal.x(), normal.y(), growth);
+    n += row * row.transpose();
+    rhs += row * normal.dot(*px - by_homography(rim));
+  }
+  const Eigen::Vector3d moved = n.ldlt().solve(rhs);
+  return *centre - by_homography(centre_mm) - moved.head<2>();
+}
+
+void measure_dots(const cv::Mat& grey, ToneCurve tone, const PredictedSheet& predicted, int sheet,
                   std::vector<FeatureObservation>& out) {
   const int first = predicted.first_dot();
   for (std::size_t i = 0; i < predicted.geometry().dots.size(); ++i) {
     const double radius = 0.5 * predicted.geometry().dots[i].diameter_mm;
     const Eigen::Vector3d& point = predicted.points_mm()[static_cast<std::size_t>(first) + i];
-    if (!predicted.at(point + Eigen::Vector3d(radius, radius, 0)) ||
-        !predicted.at(point - Eigen::Vector3d(radius, radius, 0))) {
-      continue;
-    }
     const auto homography = predicted.local_homography(point, radius);
     if (!homography) continue;
-    out.push_back(from_point(measure_dot(grey, *homography, point.head<2>(), radius), sheet,
-                             first + static_cast<int>(i)));
+    const auto bent = bent_rim(predicted, *homography, point, radius);
+    if (!bent) continue;
+    PointObservation dot = measure_dot(grey, tone, *homography, point.head<2>(), radius);
+    dot.px += *bent;
+    out.push_back(from_point(dot, sheet, first + static_cast<int>(i)));
   }
 }
 
@@ -162,7 +197,8 @@ std::optional<Eigen::Matrix3d> homography_around(const std::vector<SheetDot>& do
   return sheet.size() >= 6 ? homography_from_points(sheet, image) : std::nullopt;
 }
 
-void detect_ringed_dots(const cv::Mat& grey, const Sheet& sheet, int index, SheetDetection& out) {
+void detect_ringed_dots(const cv::Mat& grey, ToneCurve tone, const Sheet& sheet, int index,
+                        SheetDetection& out) {
   const std::vector<std::optional<Eigen::Vector2d>> found = find_ringed_dots(grey, sheet);
   if (found.empty()) {
     out.reason = "the four ringed dots were not found";
@@ -174,7 +210,7 @@ void detect_ringed_dots(const cv::Mat& grey, const Sheet& sheet, int index, Shee
     const auto homography = homography_around(dots, found, i, 2.3 * sheet.pitch_mm);
     if (!homography) continue;
     out.features.push_back(
-        from_point(measure_dot(grey, *homography, dots[i].centre_mm, 0.5 * dots[i].diameter_mm), index,
+        from_point(measure_dot(grey, tone, *homography, dots[i].centre_mm, 0.5 * dots[i].diameter_mm), index,
                    static_cast<int>(i)));
   }
 }
@@ -216,7 +252,7 @@ void add_predicted(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>
     if (!has_saddles_or_dots(sheet)) continue;
     const PredictedSheet predicted(sheet, {}, fit.adjustment.state.camera, view.camera_from_sheet);
     measure_saddles(grey, tone, predicted, view.sheet, sheet, out.features);
-    measure_dots(grey, predicted, view.sheet, out.features);
+    measure_dots(grey, tone, predicted, view.sheet, out.features);
   }
 }
 
@@ -300,7 +336,7 @@ SheetDetection detect_sheets(const cv::Mat& grey, ToneCurve tone, const std::vec
     if (sheets[s].kind == SheetKind::chessboard)
       detect_chessboard(grey, tone, sheets[s], static_cast<int>(s), out);
     if (sheets[s].kind == SheetKind::photomodeler) {
-      detect_ringed_dots(grey, sheets[s], static_cast<int>(s), out);
+      detect_ringed_dots(grey, tone, sheets[s], static_cast<int>(s), out);
     }
     if (!sheets[s].family.empty()) families.insert(sheets[s].family);
   }
@@ -335,7 +371,7 @@ SheetMeasurement measure_sheets(const cv::Mat& grey, ToneCurve tone, const std::
       out.places.emplace_back(view.sheet, first_point);
     }
     measure_saddles(grey, tone, predicted, view.sheet, sheet, out.features);
-    measure_dots(grey, predicted, view.sheet, out.features);
+    measure_dots(grey, tone, predicted, view.sheet, out.features);
   }
   return with_markers(grey, sheets, camera, rough_look(), std::move(out));
 }

@@ -82,18 +82,17 @@ bool only_not_photometric(MarkerStatus status) {
          status == MarkerStatus::not_refined;
 }
 
-}  // namespace
-
-PointObservation measure_saddle(const cv::Mat& grey, ToneCurve tone, const Eigen::Vector2d& approximate_px,
-                                const Eigen::Vector2d& to_x_px, const Eigen::Vector2d& to_y_px) {
-  const PointObservation point = refine_saddle(grey, tone, approximate_px, to_x_px, to_y_px);
-  if (!only_not_photometric(point.status)) return point;
-  return saddle_by_gradients(grey, approximate_px, to_x_px, to_y_px);
-}
-
-PointObservation measure_dot(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
-                             const Eigen::Vector2d& centre_in_plane, double radius) {
+struct DotByArea {
   PointObservation point;
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();  // in the plane
+  double radius = 0;                                 // there
+};
+
+// By the centroid of its darkness.
+DotByArea dot_by_area(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
+                      const Eigen::Vector2d& centre_in_plane, double radius) {
+  DotByArea dot;
+  PointObservation& point = dot.point;
   const Eigen::Vector2d centre = (image_from_plane * centre_in_plane.homogeneous()).hnormalized();
   point.px = centre;
   double reach = 0;
@@ -106,11 +105,11 @@ PointObservation measure_dot(const cv::Mat& grey, const Eigen::Matrix3d& image_f
   const cv::Rect window(cvRound(centre.x()) - half, cvRound(centre.y()) - half, 2 * half + 1, 2 * half + 1);
   if (half < 4 || half > 2000) {
     point.status = MarkerStatus::too_small;
-    return point;
+    return dot;
   }
   if ((window & cv::Rect(0, 0, grey.cols, grey.rows)) != window) {
     point.status = MarkerStatus::cut_by_frame;
-    return point;
+    return dot;
   }
   const cv::Mat pixels = eight_bit_window(grey, window);
   const Eigen::Matrix3d plane_from_image = image_from_plane.inverse();
@@ -138,7 +137,7 @@ PointObservation measure_dot(const cv::Mat& grey, const Eigen::Matrix3d& image_f
   point.contrast = (paper - ink) / 255;
   if (point.contrast < 0.08) {
     point.status = MarkerStatus::low_contrast;
-    return point;
+    return dot;
   }
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double weights = 0;
@@ -147,11 +146,36 @@ PointObservation measure_dot(const cv::Mat& grey, const Eigen::Matrix3d& image_f
     sum += weight * px;
     weights += weight;
   }
-  const Eigen::Vector2d eccentricity = disc_centroid(image_from_plane, centre_in_plane, radius) - centre;
+  // The area of what is dark tells the true radius, and with it the eccentricity.
+  const Eigen::Matrix3d& g = plane_from_image;
+  const Eigen::Vector3d h = g * (sum / weights).homogeneous();
+  const Eigen::Matrix2d by_px = (g.topLeftCorner<2, 2>() - h.hnormalized() * g.block<1, 2>(2, 0)) / h.z();
+  dot.radius = std::sqrt(weights * std::abs(by_px.determinant()) / kPi);
+  const Eigen::Vector2d eccentricity = disc_centroid(image_from_plane, centre_in_plane, dot.radius) - centre;
   point.px = sum / weights - eccentricity;
   point.covariance_px2 = kDotSigmaPx * kDotSigmaPx * Eigen::Matrix2d::Identity();
   point.status = (point.px - centre).norm() < kMaxMovePx ? MarkerStatus::ok : MarkerStatus::not_refined;
-  return point;
+  dot.centre = (plane_from_image * point.px.homogeneous()).hnormalized();
+  return dot;
+}
+
+}  // namespace
+
+PointObservation measure_saddle(const cv::Mat& grey, ToneCurve tone, const Eigen::Vector2d& approximate_px,
+                                const Eigen::Vector2d& to_x_px, const Eigen::Vector2d& to_y_px) {
+  const PointObservation point = refine_saddle(grey, tone, approximate_px, to_x_px, to_y_px);
+  if (!only_not_photometric(point.status)) return point;
+  return saddle_by_gradients(grey, approximate_px, to_x_px, to_y_px);
+}
+
+PointObservation measure_dot(const cv::Mat& grey, ToneCurve tone, const Eigen::Matrix3d& image_from_plane,
+                             const Eigen::Vector2d& centre_in_plane, double radius) {
+  const DotByArea rough = dot_by_area(grey, image_from_plane, centre_in_plane, radius);
+  if (rough.point.status != MarkerStatus::ok) return rough.point;
+  PointObservation point = refine_dot(grey, tone, image_from_plane, rough.centre, rough.radius);
+  // Sharpened edges misfit alike on all sides: the fit still stands in their middle, its covariance widened.
+  if (point.status == MarkerStatus::misfit) point.status = MarkerStatus::ok;
+  return only_not_photometric(point.status) ? rough.point : point;
 }
 
 }  // namespace hexcal

@@ -14,10 +14,12 @@ namespace hexcal {
                                               const Eigen::Vector2d& approximate_px,
                                               const Eigen::Vector2d& to_x_px, const Eigen::Vector2d& to_y_px);
 
-/// A dot's centre by the centroid of its darkness, moved from the centroid of the circle's image to the image
-/// of its centre (the eccentricity; Luhmann 2014): unlike a fit of its edge it does not need the dot's true
-/// diameter. `image_from_plane` near the dot; centre and radius in the plane.
-[[nodiscard]] PointObservation measure_dot(const cv::Mat& grey, const Eigen::Matrix3d& image_from_plane,
+/// The image of a dot's centre by the photometric fit of refine_dot(), from the centroid and the area of its
+/// darkness, so that its nominal radius need not be right; where clipped or processed pixels defeat the fit,
+/// by the centroid less the eccentricity (Luhmann 2014). `image_from_plane` near the dot; centre and radius
+/// in the plane.
+[[nodiscard]] PointObservation measure_dot(const cv::Mat& grey, ToneCurve tone,
+                                           const Eigen::Matrix3d& image_from_plane,
                                            const Eigen::Vector2d& centre_in_plane, double radius);
 
 }  // namespace hexcal

@@ -20,6 +20,7 @@ constexpr double kReachPx = 4;
 constexpr double kMinRadiusPx = 2;
 constexpr double kMaxMovePx = 4;
 constexpr double kNoiseMarginPx = 40;
+constexpr std::size_t kMaxPixels = 1500;
 constexpr int kMaxIterations = 20;
 constexpr double kTolerancePx = 2e-4;
 
@@ -36,34 +37,55 @@ struct DotPixel {
   double value, weight;
 };
 
+struct DiscShare {
+  double value = 0;
+  Eigen::Vector2d by_centre = Eigen::Vector2d::Zero();  // by the way from the disc's centre
+  double by_radius = 0, by_sigma = 0;
+};
+
 // Share of an isotropic Gaussian (standard deviation `sigma` px) around a pixel that falls into a disc of the
 // plane, the plane's map being affine over the Gaussian: chords of the disc along its steepest direction,
 // summed over the other direction by a rule that is exact to rounding for smooth integrands (trapezoid).
-double disc_share(const Eigen::Vector2d& from_centre, const Eigen::Matrix2d& by_px, double radius,
-                  double sigma) {
+DiscShare disc_share(const Eigen::Vector2d& from_centre, const Eigen::Matrix2d& by_px, double radius,
+                     double sigma) {
   Eigen::Vector2d steepest = by_px.transpose() * from_centre;
   if (steepest.squaredNorm() < 1e-30) steepest = Eigen::Vector2d::UnitX();
   steepest.normalize();
   const Eigen::Vector2d n = by_px * steepest;
   const Eigen::Vector2d t = by_px * Eigen::Vector2d(-steepest.y(), steepest.x());
-  constexpr double kStep = 0.5;
-  constexpr int kHalfCount = 9;
+  constexpr double kStep = 0.7;
+  constexpr int kHalfCount = 6;
+  static const std::array<double, 2 * kHalfCount + 1> kWeights = [] {
+    std::array<double, 2 * kHalfCount + 1> weights{};
+    double total = 0;
+    for (int i = -kHalfCount; i <= kHalfCount; ++i) total += standard_normal(i * kStep).density;
+    for (int i = -kHalfCount; i <= kHalfCount; ++i) {
+      weights[static_cast<std::size_t>(i + kHalfCount)] = standard_normal(i * kStep).density / total;
+    }
+    return weights;
+  }();
   const double a = n.squaredNorm();
-  double share = 0;
-  double total = 0;
+  DiscShare share;
   for (int i = -kHalfCount; i <= kHalfCount; ++i) {
     const double at = i * kStep;
-    const double density = standard_normal(at).density;
-    total += density;
+    const double weight = kWeights[static_cast<std::size_t>(i + kHalfCount)];
     const Eigen::Vector2d base = from_centre + t * (at * sigma);
     const double b = n.dot(base);
     const double discriminant = b * b - a * (base.squaredNorm() - radius * radius);
     if (discriminant <= 0) continue;
     const double root = std::sqrt(discriminant);
-    share += density * (standard_normal((-b + root) / (a * sigma)).cdf -
-                        standard_normal((-b - root) / (a * sigma)).cdf);
+    for (const double end : {1.0, -1.0}) {  // of the chord
+      const double u = (-b + end * root) / (a * sigma);
+      const NormalValue normal = standard_normal(u);
+      const Eigen::Vector2d u_by_base = (end * (b * n - a * base) / root - n) / (a * sigma);
+      const double density = end * weight * normal.density;
+      share.value += end * weight * normal.cdf;
+      share.by_centre += density * u_by_base;
+      share.by_radius += density * end * radius / (root * sigma);
+      share.by_sigma += density * (u_by_base.dot(t) * at - u / sigma);
+    }
   }
-  return share / total;
+  return share;
 }
 
 struct DotView {
@@ -130,34 +152,33 @@ DotPixels pixels_around_rim(const cv::Mat& grey, const DotView& view, const Nois
       result.pixels.push_back(pixel);
     }
   }
+  // Every k-th, k odd: a large dot's rim is told well enough.
+  const std::size_t step = result.pixels.size() / kMaxPixels | 1U;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < result.pixels.size(); i += step) result.pixels[kept++] = result.pixels[i];
+  result.pixels.resize(kept);
   return result;
 }
 
-double share_at(const DotView& view, const DotPixel& pixel, const Vector& p) {
+DiscShare share_at(const DotView& view, const DotPixel& pixel, const Vector& p) {
   return disc_share(pixel.offset - view.by_px * p.head<2>(), pixel.by_px, view.radius * (1 + p[2]),
                     std::sqrt(p[3] + kPixelVariance));
 }
 
+// The encoded value of a pixel and its derivatives by the parameters.
 double modelled(const DotView& view, const ToneResponse& tone, const DotPixel& pixel, const Vector& p,
-                Vector* row) {
-  const double share = share_at(view, pixel, p);
+                Vector& row) {
+  const DiscShare share = share_at(view, pixel, p);
   const double shade = 1 + p.tail<2>().dot(pixel.light);
-  const double unshaded = p[4] + (p[5] - p[4]) * share;
+  const double unshaded = p[4] + (p[5] - p[4]) * share.value;
   const ToneResponse::Encoded encoded = tone.encode(unshaded * shade);
-  if (row != nullptr) {
-    const double by_share = encoded.by_light * shade * (p[5] - p[4]);
-    constexpr double kSteps[4] = {1e-3, 1e-3, 1e-4, 1e-3};
-    for (int i = 0; i < 4; ++i) {
-      Vector moved = p;
-      moved[i] += kSteps[i];
-      const double after = share_at(view, pixel, moved);
-      moved[i] -= 2 * kSteps[i];
-      (*row)[i] = by_share * (after - share_at(view, pixel, moved)) / (2 * kSteps[i]);
-    }
-    (*row)[4] = encoded.by_light * shade * (1 - share);
-    (*row)[5] = encoded.by_light * shade * share;
-    row->tail<2>() = encoded.by_light * unshaded * pixel.light;
-  }
+  const double by_share = encoded.by_light * shade * (p[5] - p[4]);
+  row.head<2>() = -by_share * (view.by_px.transpose() * share.by_centre);
+  row[2] = by_share * share.by_radius * view.radius;
+  row[3] = by_share * share.by_sigma / (2 * std::sqrt(p[3] + kPixelVariance));
+  row[4] = encoded.by_light * shade * (1 - share.value);
+  row[5] = encoded.by_light * shade * share.value;
+  row.tail<2>() = encoded.by_light * unshaded * pixel.light;
   return encoded.value;
 }
 
@@ -172,7 +193,7 @@ Normals normals(const DotView& view, const ToneResponse& tone, const std::vector
   Normals result;
   Vector row;
   for (const DotPixel& pixel : pixels) {
-    const double residual = (pixel.value - modelled(view, tone, pixel, p, &row)) * pixel.weight;
+    const double residual = (pixel.value - modelled(view, tone, pixel, p, row)) * pixel.weight;
     row *= pixel.weight;
     result.n += row * row.transpose();
     result.rhs += row * residual;
@@ -187,7 +208,7 @@ bool set_levels(const DotView& view, const ToneResponse& tone, const std::vector
   Eigen::Matrix2d n = Eigen::Matrix2d::Zero();
   Eigen::Vector2d rhs = Eigen::Vector2d::Zero();
   for (const DotPixel& pixel : pixels) {
-    const double share = share_at(view, pixel, p);
+    const double share = share_at(view, pixel, p).value;
     const Eigen::Vector2d row(1 - share, share);
     n += row * row.transpose();
     rhs += row * tone.decode(pixel.value);
