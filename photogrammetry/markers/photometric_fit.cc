@@ -492,6 +492,7 @@ class MarkerFit {
       blocks += 1;
     };
     double sum = 0;
+    double squares = 0;
     double used = 0;
     int agreeing = 0;
     for (std::size_t i = 0; i < residuals_.size(); ++i) {
@@ -501,6 +502,7 @@ class MarkerFit {
       if (!pixel.kept) continue;
       const double robust = robust_weight(i);
       sum += robust * residual * residual;
+      squares += robust * std::pow(residual / pixel.weight, 2);
       used += 1;
       if (pixel.block != block) {
         end_block();
@@ -514,6 +516,9 @@ class MarkerFit {
     const double free = std::max(used - static_cast<double>(active_list_.size()), 1.0);
     fit.pixels = static_cast<int>(used);
     fit.chi2_per_dof = sum / free;
+    const ToneResponse tone(photograph_.tone.nominal(), parameters_[kShared], parameters_[kShared + 1]);
+    const double contrast = tone.encode(parameters_[kWhite]).value - tone.encode(parameters_[kBlack]).value;
+    fit.misfit = std::sqrt(squares / std::max(used, 1.0)) / std::max(contrast, 1e-9);
     fit.visible = agreeing / std::max(1.0, static_cast<double>(selected_.pixels.size()));
     fit.saturated =
         selected_.clipped / std::max(1.0, static_cast<double>(selected_.pixels.size() +

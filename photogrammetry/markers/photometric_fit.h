@@ -45,6 +45,7 @@ struct PhotometricFit {
   Eigen::Vector2d centre_px;                   ///< image of the square's centre
   Eigen::Matrix2d centre_covariance_px2;
   double chi2_per_dof = 0;
+  double misfit = 0;  ///< rms residual over the contrast, both of encoded values
   double covariance_factor =
       1;  ///< by which correlated residuals (JPEG blocks, misfit) make the covariance too small
   double blur_px = 0;

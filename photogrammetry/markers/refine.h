@@ -18,7 +18,8 @@ struct RefineOptions {
   double min_contrast = 0.03;   ///< white minus black over full scale, linear light
   double max_saturated = 0.02;  ///< share of the marker's pixels that clip
   double min_visible = 0.6;     ///< share of the pattern's transitions that the fit used
-  double max_chi2_per_dof = 5;  ///< of the photometric fit
+  double max_chi2_per_dof =
+      5;                  ///< of the photometric fit, where residuals are more than a processed picture's
   int max_pixels = 6000;  ///< of a marker that its fit uses; more are thinned, and with 2000 or fewer the
                           ///< tone curve is each marker's own
 

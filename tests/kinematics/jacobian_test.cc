@@ -88,7 +88,8 @@ TEST(Jacobian, OfReadingsEqualsAutomaticDifferentiation) {
 
 // Forward kinematics of changed machines against the implicit derivatives.
 TEST(Jacobian, OfThePoseTellsWhereForwardKinematicsGoes) {
-  for (const auto& [g, pose] : cases()) {
+  for (const auto& [g, named_pose] : cases()) {
+    const Rigid3& pose = named_pose;  // clang 14 captures no structured binding
     const PoseJacobians j = pose_jacobians(g, pose);
     const LegVector lengths = actuated_lengths(g, pose);
     const LegVector q = readings_from_lengths(g, lengths);

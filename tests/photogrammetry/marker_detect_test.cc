@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <map>
 #include <numbers>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "kinematics/geometry/pose.h"
@@ -188,6 +189,31 @@ TEST(DetectMarkers, CovariancesAreHonest) {
   EXPECT_EQ(markers, 48);
   EXPECT_GT(sum / (8 * markers), 0.8);
   EXPECT_LT(sum / (8 * markers), 1.3);
+}
+
+// Processed pictures leave residuals far above the noise of their flat areas: the marker is measured all the
+// same, and its sigmas say how much worse.
+TEST(DetectMarkers, StrongJpegAndSharpeningWidenTheSigmas) {
+  const Scene scene = one_marker(usual().patterns[6], 78, 0.3, 0.3);
+  const auto plain = detect_markers(scene.grey, ToneCurve::srgb, usual());
+  ASSERT_EQ(plain.size(), 1U);
+  std::vector<cv::Mat> processed;
+  for (const int quality : {70, 50}) {
+    std::vector<std::uint8_t> bytes;
+    cv::imencode(".jpg", scene.grey, bytes, {cv::IMWRITE_JPEG_QUALITY, quality});
+    processed.push_back(cv::imdecode(bytes, cv::IMREAD_GRAYSCALE));
+  }
+  cv::Mat soft;
+  cv::GaussianBlur(scene.grey, soft, {}, 1.0);
+  processed.emplace_back();
+  cv::addWeighted(scene.grey, 1.4, soft, -0.4, 0, processed.back());
+  for (const cv::Mat& grey : processed) {
+    const auto markers = detect_markers(grey, ToneCurve::srgb, usual());
+    ASSERT_EQ(markers.size(), 1U);
+    EXPECT_EQ(markers[0].status, MarkerStatus::ok) << marker_status_name(markers[0].status);
+    EXPECT_LT(largest_error(markers[0], scene.corners), 0.1);
+    EXPECT_GT(markers[0].covariance_px2.trace(), plain[0].covariance_px2.trace());
+  }
 }
 
 TEST(DetectMarkers, TheSameIdTwiceIsTrustedInNeitherPlace) {
