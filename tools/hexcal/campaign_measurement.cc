@@ -27,7 +27,7 @@ namespace hexcal {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kCacheFormat = 1;  // counts up when detection changes what it finds
+constexpr int kCacheFormat = 2;  // counts up when detection changes what it finds
 
 // The camera a photograph is for: by folder, by the body's serial number, or one that is for all. Of several
 // (one per zoom setting) the first whose image size and lens setting fit.

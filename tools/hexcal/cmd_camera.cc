@@ -219,7 +219,9 @@ void add_camera_command(CLI::App& app, Action& action) {
   command->add_option("IMAGES", flags->images, "photographs, or folders of them");
   command->add_option("--template", flags->templates, "sheet.yaml of the printed sheet; may be repeated");
   command->add_option("-o,--output", flags->output, "camera file to write");
-  command->add_option("--library", flags->library, "folder in which to file the camera by its lens setting");
+  command->add_option(
+      "--library", flags->library,
+      "folder in which to file the camera by its lens setting; campaign.yaml takes the folder as `camera:`");
   command->add_option("--poses", flags->poses,
                       "CSV to write: the sheet's pose in every photograph with sigmas");
   command->add_option("--report", flags->report,

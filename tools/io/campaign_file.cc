@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <set>
 
@@ -176,8 +177,24 @@ void read_scale(const YamlMap& top, Campaign& campaign) {
   map.finish();
 }
 
+// The camera files of a library (`hexcal camera --library`), of which each photograph takes the one that
+// fits.
+std::vector<CampaignCamera> cameras_in(const YamlMap& top, const std::filesystem::path& library) {
+  std::vector<CampaignCamera> cameras;
+  for (const auto& entry : std::filesystem::directory_iterator(library)) {
+    if (entry.path().extension() == ".yaml") cameras.push_back({entry.path(), "", ""});
+  }
+  if (cameras.empty()) top.fail("camera", fmt::format("{} holds no camera file (.yaml)", library.string()));
+  std::sort(cameras.begin(), cameras.end(), [](const auto& a, const auto& b) { return a.file < b.file; });
+  return cameras;
+}
+
 std::vector<CampaignCamera> read_cameras(const YamlMap& top, const std::filesystem::path& folder) {
-  if (!top.is_sequence("camera")) return {{folder / top.text("camera"), "", ""}};
+  if (!top.is_sequence("camera")) {
+    const std::filesystem::path file = folder / top.text("camera");
+    if (std::filesystem::is_directory(file)) return cameras_in(top, file);
+    return {{file, "", ""}};
+  }
   std::vector<CampaignCamera> cameras;
   for (const YamlMap& entry : top.maps("camera")) {
     CampaignCamera camera;
