@@ -73,19 +73,6 @@ Difference left_out_difference(const ModelTrial& poorer, const ModelTrial& bette
   return out;
 }
 
-double rms_px(const SheetAdjustmentResult& fit) {
-  double sum = 0;
-  double points = 0;
-  for (std::size_t v = 0; v < fit.residuals_px.size(); ++v) {
-    for (std::size_t f = 0; f < fit.residuals_px[v].size(); ++f) {
-      if (fit.state.views[v].rejected[f] != 0) continue;
-      sum += fit.residuals_px[v][f].squaredNorm();
-      points += 0.5 * static_cast<double>(fit.residuals_px[v][f].size());
-    }
-  }
-  return std::sqrt(sum / std::max(points, 1.0));
-}
-
 double left_out_sum(const ModelTrial& trial) {
   double sum = 0;
   for (const double chi2 : trial.left_out_chi2) sum += chi2;
@@ -135,7 +122,7 @@ std::vector<ModelTrial> try_variants(const std::vector<Sheet>& sheets, const Cal
     if (left > 0) trial.aicc = fit.chi2 + 2 * k + 2 * k * (k + 1) / left;
     trial.left_out_chi2 = fit.left_out_chi2;
     if (!trial.left_out_chi2.empty()) {
-      trial.cross_validation_px = rms_px(fit) * std::sqrt(left_out_sum(trial) / std::max(fit.chi2, 1e-300));
+      trial.cross_validation_px = fit.rms_px() * std::sqrt(left_out_sum(trial) / std::max(fit.chi2, 1e-300));
     }
   });
   double best = std::numeric_limits<double>::infinity();

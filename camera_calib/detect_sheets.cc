@@ -260,16 +260,18 @@ bool usable(const FeatureObservation& feature) { return feature.status == Marker
 
 // A charuco's saddles are free of the edge bleed that moves its markers' corners: with enough of them the
 // markers only identify.
+bool saddles_suffice(const std::vector<Sheet>& sheets, int sheet,
+                     const std::vector<FeatureObservation>& features) {
+  return sheets[static_cast<std::size_t>(sheet)].kind == SheetKind::charuco &&
+         std::count_if(features.begin(), features.end(), [sheet](const FeatureObservation& f) {
+           return f.sheet == sheet && f.points() == 1 && usable(f);
+         }) >= 6;
+}
+
 void prefer_saddles(const std::vector<Sheet>& sheets, std::vector<FeatureObservation>& features) {
-  for (std::size_t s = 0; s < sheets.size(); ++s) {
-    if (sheets[s].kind != SheetKind::charuco) continue;
-    const auto is_saddle = [s](const FeatureObservation& f) {
-      return f.sheet == static_cast<int>(s) && f.points() == 1 && usable(f);
-    };
-    if (std::count_if(features.begin(), features.end(), is_saddle) < 6) continue;
-    std::erase_if(features, [s](const FeatureObservation& f) {
-      return f.sheet == static_cast<int>(s) && f.points() == 4;
-    });
+  for (int s = 0; s < static_cast<int>(sheets.size()); ++s) {
+    if (!saddles_suffice(sheets, s, features)) continue;
+    std::erase_if(features, [s](const FeatureObservation& f) { return f.sheet == s && f.points() == 4; });
   }
 }
 
@@ -293,8 +295,8 @@ std::optional<MarkerGuess> guess_at(const MarkerPattern& pattern, const Predicte
 }
 
 // Features with the markers at the guesses measured in place of those that were there.
-SheetMeasurement with_markers(const cv::Mat& grey, const std::vector<Sheet>& sheets,
-                              const CameraModel& camera, const RefineOptions& options, SheetMeasurement out) {
+SheetMeasurement with_markers(const cv::Mat& grey, const CameraModel& camera, const RefineOptions& options,
+                              SheetMeasurement out) {
   RefinedMarkers refined = refine_markers(grey, out.tone, out.guesses, options, &camera);
   std::erase_if(out.features, [](const FeatureObservation& feature) { return feature.points() == 4; });
   for (std::size_t k = 0; k < refined.markers.size(); ++k) {
@@ -302,7 +304,6 @@ SheetMeasurement with_markers(const cv::Mat& grey, const std::vector<Sheet>& she
   }
   out.guesses = std::move(refined.guesses);
   out.tone = refined.tone;
-  prefer_saddles(sheets, out.features);
   sort_features(out.features);
   return out;
 }
@@ -360,6 +361,9 @@ SheetMeasurement measure_sheets(const cv::Mat& grey, ToneCurve tone, const std::
     const Sheet& sheet = sheets[static_cast<std::size_t>(view.sheet)];
     const PredictedSheet predicted(sheet, shapes[static_cast<std::size_t>(view.sheet)], camera,
                                    view.camera_from_sheet);
+    measure_saddles(grey, tone, predicted, view.sheet, sheet, out.features);
+    measure_dots(grey, tone, predicted, view.sheet, out.features);
+    if (saddles_suffice(sheets, view.sheet, out.features)) continue;
     const std::vector<SheetMarker>& markers = predicted.geometry().markers;
     for (std::size_t m = 0; m < markers.size(); ++m) {
       const int first_point = 4 * static_cast<int>(m);
@@ -370,15 +374,13 @@ SheetMeasurement measure_sheets(const cv::Mat& grey, ToneCurve tone, const std::
       out.guesses.push_back(*guess);
       out.places.emplace_back(view.sheet, first_point);
     }
-    measure_saddles(grey, tone, predicted, view.sheet, sheet, out.features);
-    measure_dots(grey, tone, predicted, view.sheet, out.features);
   }
-  return with_markers(grey, sheets, camera, rough_look(), std::move(out));
+  return with_markers(grey, camera, rough_look(), std::move(out));
 }
 
-SheetMeasurement with_markers_measured(const cv::Mat& grey, const std::vector<Sheet>& sheets,
-                                       const CameraModel& camera, SheetMeasurement before) {
-  return with_markers(grey, sheets, camera, {}, std::move(before));
+SheetMeasurement with_markers_measured(const cv::Mat& grey, const CameraModel& camera,
+                                       SheetMeasurement before) {
+  return with_markers(grey, camera, {}, std::move(before));
 }
 
 }  // namespace hexcal

@@ -47,7 +47,7 @@ struct SheetMeasurement {
                                               const CameraModel& camera, const std::vector<SheetView>& views);
 
 /// The same markers as well as they can be, through the lens of `camera`.
-[[nodiscard]] SheetMeasurement with_markers_measured(const cv::Mat& grey, const std::vector<Sheet>& sheets,
-                                                     const CameraModel& camera, SheetMeasurement before);
+[[nodiscard]] SheetMeasurement with_markers_measured(const cv::Mat& grey, const CameraModel& camera,
+                                                     SheetMeasurement before);
 
 }  // namespace hexcal

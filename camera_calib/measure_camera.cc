@@ -143,7 +143,7 @@ void measure_markers(const std::vector<Sheet>& sheets, const Pixels& pixels, Cal
     tbb::parallel_for(std::size_t{0}, photographs.size(), [&](std::size_t i) {
       if (measured[i].guesses.empty()) return;
       if (round > 0 && !bent_otherwise(measured[i].features, before, state.camera)) return;
-      measured[i] = with_markers_measured(pixels.get(i).grey, sheets, state.camera, std::move(measured[i]));
+      measured[i] = with_markers_measured(pixels.get(i).grey, state.camera, std::move(measured[i]));
       photographs[i].features = measured[i].features;
       ++count;
     });

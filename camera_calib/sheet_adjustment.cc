@@ -335,6 +335,19 @@ void add_statistics(const Network& network, const Blocks& blocks, const SheetAdj
 
 }  // namespace
 
+double SheetAdjustmentResult::rms_px() const {
+  double sum = 0;
+  double points = 0;
+  for (std::size_t v = 0; v < residuals_px.size(); ++v) {
+    for (std::size_t f = 0; f < residuals_px[v].size(); ++f) {
+      if (state.views[v].rejected[f] != 0) continue;
+      sum += residuals_px[v][f].squaredNorm();
+      points += 0.5 * static_cast<double>(residuals_px[v][f].size());
+    }
+  }
+  return std::sqrt(sum / std::max(points, 1.0));
+}
+
 const char* board_freedom_name(BoardFreedom freedom) {
   switch (freedom) {
     case BoardFreedom::ideal:

@@ -79,6 +79,9 @@ struct SheetAdjustmentResult {
   Eigen::MatrixXd camera_covariance;
   std::vector<Eigen::Matrix<double, 6, 6>> pose_covariance;  ///< per view, perturbation of covariance.h
 
+  /// Root mean square distance of the points that were used from where the model has them; 0 without any.
+  [[nodiscard]] double rms_px() const;
+
   [[nodiscard]] double sigma0() const {
     return observations > unknowns ? std::sqrt(chi2 / (observations - unknowns)) : 0.0;
   }

@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "kinematics/geometry/input_error.h"
+#include "photogrammetry/photograph/photograph_format.h"
 
 namespace hexcal {
 namespace fs = std::filesystem;
@@ -20,15 +21,24 @@ std::string lower(std::string text) {
   return text;
 }
 
-std::string extension(const fs::path& path) { return lower(path.extension().string()); }
-
 // Of files with one stem the format that stands first is taken: what the camera itself developed, then what
 // people developed, then RAW.
 int format_rank(const fs::path& path) {
-  static const std::map<std::string, int> kRanks{{".jpg", 0}, {".jpeg", 0}, {".tif", 1}, {".tiff", 1},
-                                                 {".png", 2}, {".nef", 3},  {".dng", 4}};
-  const auto found = kRanks.find(extension(path));
-  return found == kRanks.end() ? -1 : found->second;
+  switch (photograph_format(path)) {
+    case PhotographFormat::jpeg:
+      return 0;
+    case PhotographFormat::tiff:
+      return 1;
+    case PhotographFormat::png:
+      return 2;
+    case PhotographFormat::nef:
+      return 3;
+    case PhotographFormat::dng:
+      return 4;
+    case PhotographFormat::none:
+      break;
+  }
+  return -1;
 }
 
 bool is_litter(const fs::path& path) {

@@ -56,12 +56,6 @@ double NoiseModel::variance(double encoded) const {
   return at_level_[i] + share * (at_level_[i + 1] - at_level_[i]);
 }
 
-NoiseModel NoiseModel::scaled(double factor) const {
-  NoiseModel model = *this;
-  for (double& v : model.at_level_) v *= factor;
-  return model;
-}
-
 NoiseModel estimate_noise(const cv::Mat& grey, const cv::Rect& region) {
   const cv::Rect box = region & cv::Rect(0, 0, grey.cols, grey.rows);
   const double scale = full_scale(grey);

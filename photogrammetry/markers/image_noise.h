@@ -9,7 +9,6 @@ namespace hexcal {
 class NoiseModel {
  public:
   [[nodiscard]] double variance(double encoded) const;
-  [[nodiscard]] NoiseModel scaled(double factor) const;
 
  private:
   friend NoiseModel estimate_noise(const cv::Mat& grey, const cv::Rect& region);

@@ -1,9 +1,9 @@
 #include "photogrammetry/photograph/photograph.h"
 
-#include <algorithm>
 #include <fstream>
 
 #include "photogrammetry/photograph/decoders.h"
+#include "photogrammetry/photograph/photograph_format.h"
 #include "photogrammetry/photograph/sha256.h"
 
 namespace hexcal {
@@ -35,16 +35,9 @@ FileBytes read_bytes(const std::filesystem::path& path) {
   return file;
 }
 
-bool has_raw_extension(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension == ".nef" || extension == ".dng";
-}
-
 DecodedImage decode(const std::filesystem::path& path, std::string_view bytes) {
   if (bytes.substr(0, 2) == "\xFF\xD8") return decode_jpeg_luma(bytes);
-  if (has_raw_extension(path)) return decode_raw_green(bytes);
+  if (is_raw(photograph_format(path))) return decode_raw_green(bytes);
   return decode_raster(bytes);
 }
 

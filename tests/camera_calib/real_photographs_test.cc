@@ -52,16 +52,7 @@ Found calibrate(const std::vector<fs::path>& paths, const Sheet& sheet) {
   found.sigma_f = std::sqrt(fit.camera_covariance(0, 0));
   found.sigma_cx = std::sqrt(fit.camera_covariance(2, 2));
   found.sigma_cy = std::sqrt(fit.camera_covariance(3, 3));
-  double sum = 0;
-  double points = 0;
-  for (std::size_t v = 0; v < fit.residuals_px.size(); ++v) {
-    for (std::size_t f = 0; f < fit.residuals_px[v].size(); ++f) {
-      if (fit.state.views[v].rejected[f] != 0) continue;
-      sum += fit.residuals_px[v][f].squaredNorm();
-      points += 0.5 * static_cast<double>(fit.residuals_px[v][f].size());
-    }
-  }
-  found.rms_px = std::sqrt(sum / points);
+  found.rms_px = fit.rms_px();
   found.photographs = fit.state.views.size();
   return found;
 }

@@ -2,17 +2,16 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "camera_calib/camera_report.h"
 #include "camera_calib/compare_cameras.h"
 #include "camera_calib/measure_camera.h"
 #include "kinematics/geometry/input_error.h"
+#include "photogrammetry/photograph/photograph_format.h"
 #include "tools/hexcal/camera_tables.h"
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/terminal.h"
@@ -55,14 +54,6 @@ constexpr const char* kCameraFooter = R"(  hexcal camera photographs/ --template
 
 Exit code 1 if photographs failed or the verdict is retake; the camera file is written all the same.)";
 
-bool is_photograph(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  static const std::set<std::string> known{".jpg", ".jpeg", ".png", ".tif", ".tiff", ".nef", ".dng"};
-  return known.count(extension) > 0;
-}
-
 // Files as given, folders replaced by the photographs in them, sorted.
 std::vector<fs::path> photograph_paths(const std::vector<fs::path>& given) {
   std::vector<fs::path> out;
@@ -76,7 +67,8 @@ std::vector<fs::path> photograph_paths(const std::vector<fs::path>& given) {
     }
     std::vector<fs::path> found;
     for (const auto& entry : fs::directory_iterator(path)) {
-      if (entry.is_regular_file() && is_photograph(entry.path())) found.push_back(entry.path());
+      if (entry.is_regular_file() && photograph_format(entry.path()) != PhotographFormat::none)
+        found.push_back(entry.path());
     }
     if (found.empty()) {
       throw InputError(

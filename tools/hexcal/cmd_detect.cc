@@ -2,15 +2,14 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <set>
 
 #include "kinematics/geometry/input_error.h"
 #include "photogrammetry/markers/detect.h"
+#include "photogrammetry/photograph/photograph_format.h"
 #include "photogrammetry/photograph/sha256.h"
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/terminal.h"
@@ -40,14 +39,6 @@ struct DetectFlags {
   bool json = false;
 };
 
-bool is_photograph(const fs::path& path) {
-  static const std::set<std::string> kExtensions{".jpg", ".jpeg", ".png", ".tif", ".tiff", ".nef", ".dng"};
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return kExtensions.count(extension) > 0;
-}
-
 struct Source {
   fs::path path;
   std::string name;  // as written
@@ -73,7 +64,7 @@ std::vector<Source> list_photographs(const std::vector<fs::path>& inputs, const 
     }
     std::vector<Source> found;
     for (const auto& entry : fs::recursive_directory_iterator(input)) {
-      if (entry.is_regular_file() && is_photograph(entry.path())) {
+      if (entry.is_regular_file() && photograph_format(entry.path()) != PhotographFormat::none) {
         found.push_back({entry.path(), name_of(entry.path(), input)});
       }
     }

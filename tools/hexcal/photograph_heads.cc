@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 
+#include "photogrammetry/photograph/photograph_format.h"
 #include "photogrammetry/photograph/sha256.h"
 #include "tools/io/atomic_file.h"
 
@@ -13,11 +14,7 @@ namespace fs = std::filesystem;
 namespace {
 
 // Of a RAW file the head tells the size of the sensor or of a preview, not of what is developed from it.
-bool head_tells_size(const fs::path& path) {
-  std::string ending = path.extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return ending != ".nef" && ending != ".dng";
-}
+bool head_tells_size(const fs::path& path) { return !is_raw(photograph_format(path)); }
 
 class HeadInspector {
  public:

@@ -1,12 +1,12 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "photogrammetry/photograph/photograph.h"
+#include "photogrammetry/photograph/photograph_format.h"
 #include "tools/hexcal/network_part.h"
 
 namespace hexcal {
@@ -37,16 +37,8 @@ int decoding_flags(int width_px, int wanted_px) {
   return flags | cv::IMREAD_IGNORE_ORIENTATION;
 }
 
-std::string lower_case_extension(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::ranges::transform(extension, extension.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
-
 cv::Mat decoded(const fs::path& path, int width_px, int wanted_px) {
-  const std::string extension = lower_case_extension(path);
-  if (extension == ".jpg" || extension == ".jpeg")
+  if (photograph_format(path) == PhotographFormat::jpeg)
     return cv::imread(path.string(), decoding_flags(width_px, wanted_px));
   const Photograph photograph = read_photograph(path);
   if (photograph.status != PhotographStatus::ok) return {};
