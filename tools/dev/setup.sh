@@ -11,7 +11,7 @@ packages=(
   # Python module (left out where these are missing)
   pybind11-dev python3-dev python3-numpy
   # tests
-  libgtest-dev libgmock-dev libbenchmark-dev liblensfun-dev liblensfun-data-v1 poppler-utils opencv-doc
+  libgtest-dev libgmock-dev libbenchmark-dev valgrind liblensfun-dev liblensfun-data-v1 poppler-utils opencv-doc
 )
 
 missing=()
