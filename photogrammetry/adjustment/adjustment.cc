@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "kinematics/geometry/input_error.h"
 #include "kinematics/geometry/median.h"
@@ -40,10 +41,10 @@ struct Stage {
   std::vector<Sighting> sightings;
   BundleLayout layout;
   BundleSettings settings;
-  BundleSystem system;         // undamped, at the solution
-  Eigen::MatrixXd covariance;  // of the common parameters
-  double redundancy = 0;       // of the observations alone
-  double squares = 0;          // of the observations, over the data variance
+  std::optional<BundleSystem> system;  // undamped, at the solution; empty until it is analysed
+  Eigen::MatrixXd covariance;          // of the common parameters
+  double redundancy = 0;               // of the observations alone
+  double squares = 0;                  // of the observations, over the data variance
   bool converged = false;
   int iterations = 0;
 };
@@ -94,6 +95,7 @@ void solve(const Job& job, Stage& stage, double robust_limit, const BundleSettin
   stage.geometry = std::move(solution.geometry);
   stage.converged = solution.converged;
   stage.iterations += solution.iterations;
+  stage.system = std::move(solution.system);
   stage.squares = 0;
   for (const double q : solution.squares) stage.squares += std::max(0.0, q);
 }
@@ -116,11 +118,13 @@ void analyse(const Job& job, Stage& stage) {
     weights[s] = 1;
     rows += stage.sightings[s].rows;
   }
-  stage.system =
-      assemble_bundle(job.network, stage.geometry, stage.sightings, weights, stage.layout, stage.settings, 0);
-  stage.covariance = common_covariance(stage.system, stage.layout, stage.settings);
+  if (!stage.system) {
+    stage.system = assemble_bundle(job.network, stage.geometry, stage.sightings, weights, stage.layout,
+                                   stage.settings, 0);
+  }
+  stage.covariance = common_covariance(*stage.system, stage.layout, stage.settings);
   double unknowns = stage.layout.size - (stage.settings.interior_moves ? 0 : stage.layout.num_interior);
-  for (const EpochElimination& epoch : stage.system.epochs) {
+  for (const EpochElimination& epoch : stage.system->epochs) {
     unknowns += 6.0 * static_cast<double>(epoch.photos.size()) + (epoch.has_pose ? 6 : 0);
   }
   stage.redundancy = rows - unknowns + prior_information(job, stage);
@@ -174,7 +178,7 @@ bool readmit_by_corners(const Job& job, const Stage& stage, Sighting& sighting, 
     if (!whiten(trial)) continue;
     const std::vector<Sighting> one{trial};
     const double statistic = test_sightings(job.network, stage.geometry, one, stage.layout, stage.settings,
-                                            stage.system, stage.covariance)[0]
+                                            *stage.system, stage.covariance)[0]
                                  .statistic;
     if (statistic >= least) continue;
     least = statistic;
@@ -199,7 +203,7 @@ void reject_outliers(const Job& job, Stage& stage, double robust_limit2) {
     analyse(job, stage);
     const std::vector<SightingTest> tests =
         test_sightings(job.network, stage.geometry, stage.sightings, stage.layout, stage.settings,
-                       stage.system, stage.covariance);
+                       *stage.system, stage.covariance);
     std::vector<double> used;
     double worst = 0;
     for (std::size_t s = 0; s < tests.size(); ++s) {
@@ -395,10 +399,10 @@ AdjustmentResult adjust_network(const Network& network, const AdjustmentOptions&
   result.sightings = stage.sightings;
   result.common_covariance = stage.covariance;
   result.layout = stage.layout;
-  export_covariances(network, stage.system, result);
+  export_covariances(network, *stage.system, result);
   summarise_residuals(network,
                       test_sightings(network, stage.geometry, stage.sightings, stage.layout, stage.settings,
-                                     stage.system, stage.covariance),
+                                     *stage.system, stage.covariance),
                       result);
   if (!stage.converged) {
     result.status = AdjustmentStatus::not_converged;

@@ -115,7 +115,7 @@ BundleSolution solve_bundle_adjustment(const Network& network, const NetworkGeom
     for (std::size_t s = 0; s < sightings.size(); ++s) {
       weights[s] = solution.squares[s] < 0 ? 0.0 : robust_weight(solution.squares[s], limit2);
     }
-    const BundleSystem system =
+    BundleSystem system =
         assemble_bundle(network, solution.geometry, sightings, weights, layout, settings, damping);
     const BundleStep step = solve_bundle(system, layout, settings, network.photos.size());
     const NetworkGeometry next = stepped(solution.geometry, layout, step);
@@ -127,6 +127,7 @@ BundleSolution solve_bundle_adjustment(const Network& network, const NetworkGeom
       continue;
     }
     solution.converged = step.predicted_decrease < settings.converged + 1e-13 * cost;
+    if (solution.converged && damping == 0 && robust_limit == 0) solution.system = std::move(system);
     damping = damping <= kFirstDamping ? 0 : damping / 10;
     solution.geometry = next;
     solution.squares = std::move(squares);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "photogrammetry/adjustment/bundle_system.h"
@@ -11,6 +12,8 @@ struct BundleSolution {
   bool converged = false;
   int iterations = 0;
   std::vector<double> squares;  ///< per sighting: sum of squares of its whitened residuals; -1 if not used
+  /// Undamped, before the last step, which was too small to matter; empty where there is none such.
+  std::optional<BundleSystem> system;
 };
 
 /// Which parameters are estimated: `free_shape` adds the markers' shapes, `free_scale` the print scale.

@@ -10,9 +10,9 @@
 namespace hexcal {
 namespace {
 
-constexpr std::size_t kWave =
-    32;  // epochs worked on at a time: bounds the memory, fixes the order of the sums
+constexpr std::size_t kSums = 16;  // partial sums, whatever the threads: fixes their order
 
+// Contribution of an epoch to the reduced normal equations, in its own columns; lower triangle.
 struct ReducedEpoch {
   Eigen::MatrixXd normal;
   Eigen::VectorXd right;
@@ -67,6 +67,11 @@ struct EpochBlocks {
 
 // Eliminates the photographs, then the pose of the moving body, leaving the common parameters in `reduced`.
 void eliminate(EpochBlocks& blocks, double damping, EpochElimination& epoch, ReducedEpoch& reduced) {
+  const auto width = static_cast<Eigen::Index>(epoch.columns.size());
+  const auto count = static_cast<Eigen::Index>(epoch.photos.size()) + (epoch.has_pose ? 1 : 0);
+  // The eliminated blocks one below the other: one product takes them all from the normal equations.
+  Eigen::MatrixXd blocks_by_common(6 * count, width);
+  Eigen::MatrixXd eliminated_by_common(6 * count, width);
   for (std::size_t i = 0; i < epoch.photos.size(); ++i) {
     PhotoElimination& photo = epoch.photos[i];
     photo.inverse = invert_block(blocks.photo[i], damping);
@@ -77,17 +82,24 @@ void eliminate(EpochBlocks& blocks, double damping, EpochElimination& epoch, Red
     blocks.epoch -= blocks.photo_epoch[i].transpose() * photo.by_epoch;
     blocks.epoch_right -= blocks.photo_epoch[i].transpose() * photo.start;
     blocks.epoch_common.noalias() -= blocks.photo_epoch[i].transpose() * photo.by_common;
-    reduced.normal.noalias() -= blocks.photo_common[i].transpose() * photo.by_common;
     reduced.right.noalias() -= blocks.photo_common[i].transpose() * photo.start;
+    const auto row = 6 * static_cast<Eigen::Index>(i);
+    blocks_by_common.middleRows<6>(row) = blocks.photo_common[i];
+    eliminated_by_common.middleRows<6>(row) = photo.by_common;
   }
-  epoch.by_common = Matrix6Xd::Zero(6, static_cast<Eigen::Index>(epoch.columns.size()));
-  if (!epoch.has_pose) return;
-  epoch.inverse = invert_block(blocks.epoch, damping);
-  epoch.start = epoch.inverse * blocks.epoch_right;
-  epoch.decrease = epoch.start.dot(blocks.epoch_right);
-  epoch.by_common.noalias() = epoch.inverse * blocks.epoch_common;
-  reduced.normal.noalias() -= blocks.epoch_common.transpose() * epoch.by_common;
-  reduced.right.noalias() -= blocks.epoch_common.transpose() * epoch.start;
+  epoch.by_common = Matrix6Xd::Zero(6, width);
+  if (epoch.has_pose) {
+    epoch.inverse = invert_block(blocks.epoch, damping);
+    epoch.start = epoch.inverse * blocks.epoch_right;
+    epoch.decrease = epoch.start.dot(blocks.epoch_right);
+    epoch.by_common.noalias() = epoch.inverse * blocks.epoch_common;
+    reduced.right.noalias() -= blocks.epoch_common.transpose() * epoch.start;
+    blocks_by_common.bottomRows<6>() = blocks.epoch_common;
+    eliminated_by_common.bottomRows<6>() = epoch.by_common;
+  }
+  if (count > 0) {
+    reduced.normal.triangularView<Eigen::Lower>() -= blocks_by_common.transpose() * eliminated_by_common;
+  }
 }
 
 void reduce_epoch(const Network& network, const NetworkGeometry& geometry,
@@ -101,8 +113,8 @@ void reduce_epoch(const Network& network, const NetworkGeometry& geometry,
   for (std::size_t i = 0; i < epoch.columns.size(); ++i) {
     compact[static_cast<std::size_t>(epoch.columns[i])] = static_cast<int>(i);
   }
-  reduced.normal = Eigen::MatrixXd::Zero(width, width);
-  reduced.right = Eigen::VectorXd::Zero(width);
+  reduced.normal.setZero(width, width);
+  reduced.right.setZero(width);
   EpochBlocks blocks;
   blocks.epoch_common = Matrix6Xd::Zero(6, width);
 
@@ -149,7 +161,7 @@ void reduce_epoch(const Network& network, const NetworkGeometry& geometry,
       blocks.photo_common.back().col(i) += pc.col(a);
       if (moving) blocks.epoch_common.col(i) += ec.col(a);
       reduced.right[i] += cr[a];
-      for (Eigen::Index b = 0; b < n; ++b) {
+      for (Eigen::Index b = a; b < n; ++b) {  // the sighting's columns ascend
         reduced.normal(compact[static_cast<std::size_t>(common.column[static_cast<std::size_t>(b)])], i) +=
             cc(b, a);
       }
@@ -271,25 +283,32 @@ BundleSystem assemble_bundle(const Network& network, const NetworkGeometry& geom
   system.normal = Eigen::MatrixXd::Zero(layout.size, layout.size);
   system.right = Eigen::VectorXd::Zero(layout.size);
   system.epochs.resize(num_epochs);
-  for (std::size_t begin = 0; begin < num_epochs; begin += kWave) {
-    const std::size_t end = std::min(num_epochs, begin + kWave);
-    std::vector<ReducedEpoch> reduced(end - begin);
-    tbb::parallel_for(begin, end, [&](std::size_t e) {
+  const std::size_t num_sums = std::min(kSums, num_epochs);
+  std::vector<ReducedEpoch> sums(num_sums);
+  tbb::parallel_for(std::size_t{0}, num_sums, [&](std::size_t k) {
+    ReducedEpoch& sum = sums[k];
+    sum.normal.setZero(layout.size, layout.size);
+    sum.right.setZero(layout.size);
+    ReducedEpoch reduced;
+    for (std::size_t e = k; e < num_epochs; e += num_sums) {
+      if (members[e].empty()) continue;
       reduce_epoch(network, geometry, sightings, members[e], weights, layout, settings, damping,
-                   system.epochs[e], reduced[e - begin]);
-    });
-    for (std::size_t e = begin; e < end; ++e) {
+                   system.epochs[e], reduced);
       const std::vector<int>& columns = system.epochs[e].columns;
       for (std::size_t b = 0; b < columns.size(); ++b) {
         const auto col = static_cast<Eigen::Index>(b);
-        for (std::size_t a = 0; a < columns.size(); ++a) {
-          system.normal(columns[a], columns[b]) +=
-              reduced[e - begin].normal(static_cast<Eigen::Index>(a), col);
+        for (std::size_t a = b; a < columns.size(); ++a) {
+          sum.normal(columns[a], columns[b]) += reduced.normal(static_cast<Eigen::Index>(a), col);
         }
-        system.right[columns[b]] += reduced[e - begin].right[col];
+        sum.right[columns[b]] += reduced.right[col];
       }
     }
+  });
+  for (const ReducedEpoch& sum : sums) {
+    system.normal += sum.normal;
+    system.right += sum.right;
   }
+  system.normal.triangularView<Eigen::StrictlyUpper>() = system.normal.transpose();
   add_priors(network, geometry, layout, settings, system);
   system.normal.diagonal() *= 1 + damping;
   return system;

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -18,16 +19,66 @@ double normal_quantile(double exceeded) {
                  (1 + 1.432788 * t + 0.189269 * t * t + 0.001308 * t * t * t);
 }
 
-// Covariance of the epoch's common parameters, in its compact columns.
-Eigen::MatrixXd gather(const Eigen::MatrixXd& covariance, const std::vector<int>& columns) {
-  const auto n = static_cast<Eigen::Index>(columns.size());
-  Eigen::MatrixXd compact(n, n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    for (Eigen::Index j = 0; j < n; ++j) {
-      compact(j, i) = covariance(columns[static_cast<std::size_t>(j)], columns[static_cast<std::size_t>(i)]);
+using Matrix12d = Eigen::Matrix<double, 12, 12>;
+using Matrix12Xd = Eigen::Matrix<double, 12, Eigen::Dynamic>;
+
+// Rows of the covariance of the common parameters that an epoch touches.
+Eigen::MatrixXd gather_rows(const Eigen::MatrixXd& covariance, const std::vector<int>& columns) {
+  Eigen::MatrixXd rows(static_cast<Eigen::Index>(columns.size()), covariance.cols());
+  for (Eigen::Index j = 0; j < rows.cols(); ++j) {
+    for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+      rows(i, j) = covariance(columns[static_cast<std::size_t>(i)], j);
     }
   }
-  return compact;
+  return rows;
+}
+
+// How a photograph and its epoch follow the common parameters, P = [photo; epoch].by_common: P C with all
+// common parameters, and P C P^T. Every sighting of the photograph takes its share from these.
+struct FollowedCommon {
+  Matrix12Xd with_all;
+  Matrix12d own;
+};
+
+FollowedCommon followed_common(const EpochElimination& epoch, const PhotoElimination& photo,
+                               const Eigen::MatrixXd& rows) {
+  Matrix12Xd p(12, static_cast<Eigen::Index>(epoch.columns.size()));
+  p << photo.by_common, epoch.by_common;
+  FollowedCommon followed;
+  followed.with_all.noalias() = p * rows;
+  Matrix12Xd touched(12, p.cols());
+  for (Eigen::Index i = 0; i < p.cols(); ++i) {
+    touched.col(i) = followed.with_all.col(epoch.columns[static_cast<std::size_t>(i)]);
+  }
+  followed.own.noalias() = touched * p.transpose();
+  return followed;
+}
+
+// Covariance of a sighting's prediction (whitened, before the variance factor): errors of photograph, epoch
+// and common parameters expressed by independent parts (see PhotoElimination).
+Matrix8d predicted_covariance(const EpochElimination& epoch, const PhotoElimination& photo,
+                              const SightingJacobian& jacobian, bool moving, const CommonJacobian& common,
+                              const FollowedCommon& followed, const Eigen::MatrixXd& covariance) {
+  Matrix86d by_epoch = -jacobian.photo * photo.by_epoch;
+  if (moving) by_epoch += jacobian.epoch;
+  Eigen::Matrix<double, 8, 12> a;
+  a << -jacobian.photo, -by_epoch;
+  const Eigen::Index n = common.values.cols();
+  Eigen::Matrix<double, 12, Eigen::Dynamic, 0, 12, CommonJacobian::kMax> with_own(12, n);
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, CommonJacobian::kMax, CommonJacobian::kMax> own(n,
+                                                                                                           n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const int cj = common.column[static_cast<std::size_t>(j)];
+    with_own.col(j) = followed.with_all.col(cj);
+    for (Eigen::Index i = 0; i < n; ++i)
+      own(i, j) = covariance(common.column[static_cast<std::size_t>(i)], cj);
+  }
+  const Matrix8d crossed = a * (with_own * common.values.transpose());
+  Matrix8d predicted = a * followed.own * a.transpose() + crossed + crossed.transpose();
+  predicted += common.values * own * common.values.transpose();
+  predicted += jacobian.photo * photo.inverse * jacobian.photo.transpose();
+  if (epoch.has_pose) predicted += by_epoch * epoch.inverse * by_epoch.transpose();
+  return predicted;
 }
 
 }  // namespace
@@ -50,22 +101,21 @@ std::vector<SightingTest> test_sightings(const Network& network, const NetworkGe
     if (testable) members[static_cast<std::size_t>(network.photos[p].epoch)].push_back(s);
   }
   tbb::parallel_for(std::size_t{0}, system.epochs.size(), [&](std::size_t e) {
+    if (members[e].empty()) return;
     const EpochElimination& epoch = system.epochs[e];
-    const Eigen::MatrixXd local = gather(covariance, epoch.columns);
-    const auto width = static_cast<Eigen::Index>(epoch.columns.size());
-    std::vector<int> compact(static_cast<std::size_t>(layout.size), -1);
-    for (std::size_t i = 0; i < epoch.columns.size(); ++i) {
-      compact[static_cast<std::size_t>(epoch.columns[i])] = static_cast<int>(i);
-    }
+    const Eigen::MatrixXd rows = gather_rows(covariance, epoch.columns);
+    const PhotoElimination* photo = nullptr;
+    FollowedCommon followed;
     SightingJacobian jacobian;
     CommonJacobian common;
     Vector8d r;
-    Eigen::MatrixXd by_common(8, width);
     for (const std::size_t s : members[e]) {
       const Sighting& sighting = sightings[s];
-      const PhotoElimination* photo = nullptr;
-      for (const PhotoElimination& candidate : epoch.photos) {
-        if (candidate.photo == sighting.photo) photo = &candidate;
+      if (photo == nullptr || photo->photo != sighting.photo) {
+        const auto found = std::find_if(epoch.photos.begin(), epoch.photos.end(),
+                                        [&](const auto& entry) { return entry.photo == sighting.photo; });
+        photo = found == epoch.photos.end() ? nullptr : &*found;
+        if (photo != nullptr) followed = followed_common(epoch, *photo, rows);
       }
       const bool moving = network.markers[static_cast<std::size_t>(sighting.marker)].body == Body::moving;
       tests[s].statistic = std::numeric_limits<double>::infinity();
@@ -73,34 +123,8 @@ std::vector<SightingTest> test_sightings(const Network& network, const NetworkGe
       if (!sighting_residual(network, geometry, sighting, r, &jacobian)) continue;
       common_jacobian(layout, network.photos[static_cast<std::size_t>(sighting.photo)].camera, sighting,
                       jacobian, common);
-      // Errors of photograph and epoch expressed by independent parts (see PhotoElimination).
-      Matrix86d by_epoch = -jacobian.photo * photo->by_epoch;
-      if (moving) by_epoch += jacobian.epoch;
-      by_common.noalias() = -jacobian.photo * photo->by_common;
-      by_common.noalias() -= by_epoch * epoch.by_common;
-      bool known = true;
-      for (Eigen::Index i = 0; i < common.values.cols(); ++i) {
-        const int column = compact[static_cast<std::size_t>(common.column[static_cast<std::size_t>(i)])];
-        if (column >= 0) {
-          by_common.col(column) += common.values.col(i);
-        } else {
-          known = false;  // its marker is used nowhere in this epoch: take the marker's own covariance below
-        }
-      }
-      Matrix8d predicted = jacobian.photo * photo->inverse * jacobian.photo.transpose();
-      if (epoch.has_pose) predicted += by_epoch * epoch.inverse * by_epoch.transpose();
-      predicted += by_common * local * by_common.transpose();
-      if (!known) {
-        for (Eigen::Index i = 0; i < common.values.cols(); ++i) {
-          const int ci = common.column[static_cast<std::size_t>(i)];
-          if (compact[static_cast<std::size_t>(ci)] >= 0) continue;
-          for (Eigen::Index j = 0; j < common.values.cols(); ++j) {
-            const int cj = common.column[static_cast<std::size_t>(j)];
-            if (compact[static_cast<std::size_t>(cj)] >= 0) continue;
-            predicted += covariance(ci, cj) * common.values.col(i) * common.values.col(j).transpose();
-          }
-        }
-      }
+      Matrix8d predicted =
+          predicted_covariance(epoch, *photo, jacobian, moving, common, followed, covariance);
       predicted /= settings.data_variance;
       const int n = sighting.rows;
       const double sign = sighting.status == SightingStatus::used ? -1.0 : 1.0;

@@ -79,6 +79,10 @@ class CampaignLock {
 /// swapped (targets.csv), cameras without a covariance.
 void judge_against_files(const OpenCampaign& open, CampaignResult& result);
 
+/// The files whose numbers are in the results, beside the photographs.
+[[nodiscard]] std::vector<std::filesystem::path> measurement_inputs(const MeasureRequest& request,
+                                                                    const OpenCampaign& open);
+
 /// Writes poses.csv and everything beside it; returns the files written.
 std::vector<std::filesystem::path> write_results(const MeasureRequest& request, const OpenCampaign& open,
                                                  const CampaignObservations& observations,

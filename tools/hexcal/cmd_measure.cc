@@ -8,6 +8,7 @@
 #include "kinematics/geometry/input_error.h"
 #include "tools/hexcal/campaign_measurement.h"
 #include "tools/hexcal/commands.h"
+#include "tools/hexcal/measurement_record.h"
 #include "tools/hexcal/photograph_heads.h"
 #include "tools/hexcal/terminal.h"
 
@@ -94,16 +95,7 @@ std::string next_command(const std::filesystem::path& path, const Campaign& camp
   return fmt::format("hexcal {} {}", machine_known ? "compensate" : "report", shell_word(path.string()));
 }
 
-int measure(MeasureFlags flags) {
-  MeasureRequest& request = flags.request;
-  request.interior_fixed = flags.interior == "fixed";
-  request.cache = !flags.no_cache;
-  OpenCampaign open = open_campaign(request);
-  if (flags.dry_run) {
-    const std::vector<HeadFinding> findings = inspect_heads(open);
-    return flags.json ? list_as_json(open, findings) : list_only(open, findings);
-  }
-  const CampaignLock lock(open.results);
+MeasurementAnswer measure_anew(const MeasureRequest& request, OpenCampaign& open) {
   CampaignObservations observations;
   if (request.observations) {
     observations = campaign_observations(*request.observations, open);
@@ -114,15 +106,35 @@ int measure(MeasureFlags flags) {
   CampaignResult result = extract_poses(open.campaign, observations, extract_options(request));
   refuse_foreign_camera(request.campaign, observations, result);
   judge_against_files(open, result);
-  const std::vector<std::filesystem::path> written = write_results(request, open, observations, result);
+  MeasurementAnswer answer;
+  answer.written = write_results(request, open, observations, result);
+  answer.text = measurement_text(observations, result, open.listing);
+  answer.json = measurement_json(observations, result, open.listing);
+  answer.exit_code = measurement_exit_code(result);
+  keep_measurement(request, open, observations, answer);
+  return answer;
+}
+
+int measure(MeasureFlags flags) {
+  MeasureRequest& request = flags.request;
+  request.interior_fixed = flags.interior == "fixed";
+  request.cache = !flags.no_cache;
+  OpenCampaign open = open_campaign(request);
+  if (flags.dry_run) {
+    const std::vector<HeadFinding> findings = inspect_heads(open);
+    return flags.json ? list_as_json(open, findings) : list_only(open, findings);
+  }
+  const CampaignLock lock(open.results);
+  std::optional<MeasurementAnswer> answer = unchanged_measurement(request, open);
+  if (!answer) answer = measure_anew(request, open);
   if (flags.json) {
-    fmt::print("{}", measurement_json(observations, result, open.listing));
+    fmt::print("{}", answer->json);
   } else {
-    fmt::print("{}", measurement_text(observations, result, open.listing));
-    fmt::print("{}", written_line(written));
+    fmt::print("{}", answer->text);
+    fmt::print("{}", written_line(answer->written));
     suggest_next(next_command(request.campaign, open.campaign));
   }
-  return measurement_exit_code(result);
+  return answer->exit_code;
 }
 
 }  // namespace

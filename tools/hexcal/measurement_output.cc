@@ -58,15 +58,19 @@ std::string length_line(const char* kind, const MeasuredLength& length) {
 
 }  // namespace
 
-std::vector<fs::path> write_results(const MeasureRequest& request, const OpenCampaign& open,
-                                    const CampaignObservations& observations, const CampaignResult& result) {
+std::vector<fs::path> measurement_inputs(const MeasureRequest& request, const OpenCampaign& open) {
   std::vector<fs::path> inputs{open.campaign.file};
   for (const CampaignCamera& camera : open.campaign.cameras) inputs.push_back(camera.file);
   for (const auto* rule : {&open.campaign.ug, &open.campaign.lg}) {
     if (*rule && (*rule)->nominal_file) inputs.push_back(*(*rule)->nominal_file);
   }
   if (request.observations) inputs.push_back(*request.observations);
-  const std::string head = provenance_line(kVersion, "measure", inputs);
+  return inputs;
+}
+
+std::vector<fs::path> write_results(const MeasureRequest& request, const OpenCampaign& open,
+                                    const CampaignObservations& observations, const CampaignResult& result) {
+  const std::string head = provenance_line(kVersion, "measure", measurement_inputs(request, open));
   std::vector<std::pair<fs::path, std::string>> files;
   const auto write = [&](const fs::path& path, std::string text) {
     files.emplace_back(path, std::move(text));

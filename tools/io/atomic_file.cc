@@ -118,8 +118,20 @@ std::string read_file(const std::filesystem::path& path) {
   }
   std::ifstream in(path, std::ios::binary);
   if (!in) fail(path, "read");
-  std::string contents((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  // In one piece; what has no size beforehand (a pipe) in pieces.
+  const std::uintmax_t expected = std::filesystem::file_size(path, error);
+  std::string contents(error ? 0 : static_cast<std::size_t>(expected), '\0');
+  std::size_t size = 0;
+  while (in) {
+    if (size == contents.size()) {
+      if (in.peek() == std::char_traits<char>::eof()) break;
+      contents.resize(size + 65536);
+    }
+    in.read(contents.data() + size, static_cast<std::streamsize>(contents.size() - size));
+    size += static_cast<std::size_t>(in.gcount());
+  }
   if (in.bad()) fail(path, "read");
+  contents.resize(size);
   return contents;
 }
 

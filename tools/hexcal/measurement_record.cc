@@ -1,0 +1,125 @@
+#include "tools/hexcal/measurement_record.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "kinematics/geometry/input_error.h"
+#include "photogrammetry/photograph/sha256.h"
+#include "tools/io/atomic_file.h"
+
+namespace hexcal {
+namespace fs = std::filesystem;
+namespace {
+
+using FileHash = std::pair<std::string, std::string>;  // path, SHA-256
+
+fs::path record_file(const OpenCampaign& open) { return open.results / "cache" / "measurement.json"; }
+
+// Empty for a file that cannot be read.
+std::string hash_of(const fs::path& path) {
+  try {
+    return sha256_hex(read_file(path));
+  } catch (const InputError&) {
+    return "";
+  }
+}
+
+// Everything but the content of files: flags and listing.
+std::string circumstances(const MeasureRequest& request, const OpenCampaign& open) {
+  std::string text = fmt::format(
+      "{} {} {} {} {} {} {} {}\n", request.campaign.string(), request.poses_dir.value_or("").string(),
+      open.poses_csv.string(), request.observations.value_or("").string(),
+      request.group_by_time_s.value_or(-1), request.interior_fixed, request.overlays, request.colmap);
+  if (request.observations) return sha256_hex(text);
+  const ImageListing& listing = open.listing;
+  for (const std::string& pose : listing.poses) text += fmt::format("{}\n", pose);
+  for (std::size_t i = 0; i < listing.images.size(); ++i) {
+    const CampaignImage& image = listing.images[i];
+    text +=
+        fmt::format("{} {} {} {}\n", image.name, image.pose, image.path.string(), open.camera_of_image[i]);
+  }
+  for (const SkippedFile& file : listing.skipped) text += fmt::format("{}: {}\n", file.name, file.reason);
+  return sha256_hex(text);
+}
+
+// The program itself and all that open_campaign and judge_against_files read.
+std::vector<fs::path> files_read(const MeasureRequest& request, const OpenCampaign& open) {
+  std::vector<fs::path> files = measurement_inputs(request, open);
+  files.emplace_back("/proc/self/exe");
+  for (const auto& file : {open.campaign.images_table, open.campaign.targets}) {
+    if (file) files.push_back(*file);
+  }
+  return files;
+}
+
+std::vector<FileHash> hashes_of(const std::vector<fs::path>& files) {
+  std::vector<FileHash> hashes;
+  for (const fs::path& file : files) hashes.emplace_back(file.string(), hash_of(file));
+  return hashes;
+}
+
+bool all_unchanged(const std::vector<FileHash>& files, int threads) {
+  std::vector<char> same(files.size(), 0);
+  tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
+  arena.execute([&] {
+    tbb::parallel_for(std::size_t{0}, files.size(),
+                      [&](std::size_t i) { same[i] = hash_of(files[i].first) == files[i].second ? 1 : 0; });
+  });
+  return std::find(same.begin(), same.end(), 0) == same.end();
+}
+
+}  // namespace
+
+std::optional<MeasurementAnswer> unchanged_measurement(const MeasureRequest& request,
+                                                       const OpenCampaign& open) {
+  const fs::path path = record_file(open);
+  if (!request.cache || !fs::exists(path)) return std::nullopt;
+  try {
+    const auto record = nlohmann::json::parse(read_file(path));
+    if (record.at("circumstances").get<std::string>() != circumstances(request, open)) return std::nullopt;
+    const auto read = record.at("read").get<std::vector<FileHash>>();
+    if (read != hashes_of(files_read(request, open))) return std::nullopt;
+    MeasurementAnswer answer;
+    answer.text = record.at("text").get<std::string>();
+    answer.exit_code = record.at("exit_code").get<int>();
+    const auto written = record.at("written").get<std::vector<FileHash>>();
+    for (const FileHash& file : written) answer.written.emplace_back(file.first);
+    if (!all_unchanged(written, request.threads) ||
+        !all_unchanged(record.at("photographs").get<std::vector<FileHash>>(), request.threads)) {
+      return std::nullopt;
+    }
+    answer.json = read_file(open.results / "quality.json");
+    return answer;
+  } catch (const nlohmann::json::exception&) {
+  } catch (const InputError&) {
+    // A damaged record is made anew.
+  }
+  return std::nullopt;
+}
+
+void keep_measurement(const MeasureRequest& request, const OpenCampaign& open,
+                      const CampaignObservations& observations, const MeasurementAnswer& answer) {
+  if (!request.cache) return;
+  std::vector<FileHash> photographs;
+  for (std::size_t i = 0; i < open.listing.images.size(); ++i) {
+    // What was decoded counts, not what may have taken its place since.
+    const std::string& seen = observations.photographs[i].seen.sha256;
+    const fs::path& path = open.listing.images[i].path;
+    photographs.emplace_back(path.string(), seen.empty() ? hash_of(path) : seen);
+  }
+  const nlohmann::ordered_json record{{"circumstances", circumstances(request, open)},
+                                      {"read", hashes_of(files_read(request, open))},
+                                      {"photographs", photographs},
+                                      {"written", hashes_of(answer.written)},
+                                      {"exit_code", answer.exit_code},
+                                      {"text", answer.text}};
+  write_file_atomically(record_file(open),
+                        record.dump(1, ' ', false, nlohmann::json::error_handler_t::replace),
+                        Keep::unless_power_fails);
+}
+
+}  // namespace hexcal
