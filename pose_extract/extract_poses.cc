@@ -10,6 +10,7 @@
 
 #include "kinematics/geometry/covariance.h"
 #include "kinematics/geometry/input_error.h"
+#include "photogrammetry/adjustment/marker_map.h"
 #include "pose_extract/photograph_screening.h"
 #include "pose_extract/pose_verdict.h"
 
@@ -86,6 +87,23 @@ DatumFrame body_frame(const CampaignResult& result, const std::optional<FrameRul
     return frame_from_features(result.network, result.adjusted, body, *rule->features);
   }
   return frame_from_nominal(result.network, result.adjusted, body, rule->nominal, with_scale);
+}
+
+// Home and poses spread evenly over those with photographs that count.
+std::vector<int> poses_of_map(const CampaignResult& result, int wanted) {
+  std::vector<int> with_photographs;
+  for (const NetworkPhoto& photo : result.network.photos) {
+    if (!photo.markers.empty()) with_photographs.push_back(photo.epoch);
+  }
+  std::sort(with_photographs.begin(), with_photographs.end());
+  with_photographs.erase(std::unique(with_photographs.begin(), with_photographs.end()),
+                         with_photographs.end());
+  std::vector<int> chosen;
+  if (result.home_epoch >= 0) chosen.push_back(result.home_epoch);
+  const std::size_t n = with_photographs.size();
+  const std::size_t count = std::min(n, static_cast<std::size_t>(wanted));
+  for (std::size_t i = 0; i < count; ++i) chosen.push_back(with_photographs[i * n / count]);
+  return chosen;
 }
 
 double scale_sigma(const CampaignResult& result, const DatumFrame& frame) {
@@ -277,6 +295,9 @@ void ExtractOptions::validate() const {
   if (!(max_sigma_mm > 0)) {
     throw InputError(fmt::format("option max_sigma_mm: found {}, wanted more than 0", max_sigma_mm));
   }
+  if (map_poses < 0 || map_poses == 1) {
+    throw InputError(fmt::format("option map_poses: found {}, wanted 2 or more, or 0", map_poses));
+  }
   if (min_intersection_deg < 0) {
     throw InputError(
         fmt::format("option min_intersection_deg: found {}, wanted 0 or more", min_intersection_deg));
@@ -318,7 +339,10 @@ CampaignResult extract_poses(const Campaign& campaign, const CampaignObservation
   result.network = make_network(campaign, observations, result.photographs);
   ExtractOptions chosen = options;
   choose_scale(campaign, result, chosen.adjustment);
-  result.adjusted = adjust_network(result.network, chosen.adjustment);
+  result.adjusted =
+      options.map_poses > 0 && options.map_poses < result.network.num_epochs
+          ? adjust_network_by_map(result.network, poses_of_map(result, options.map_poses), chosen.adjustment)
+          : adjust_network(result.network, chosen.adjustment);
   result.poses.resize(observations.poses.size());
   result.influences.resize(observations.poses.size());
   for (std::size_t e = 0; e < result.poses.size(); ++e) result.poses[e].id = observations.poses[e];

@@ -34,6 +34,9 @@ struct CampaignObservations {
 
 struct ExtractOptions {
   AdjustmentOptions adjustment;
+  /// With more poses than this, the markers are mapped from this many, spread over the campaign, and the
+  /// others are measured one by one on that map (marker_map.h); 0: one adjustment of all.
+  int map_poses = 0;
   /// A pose whose largest position sigma exceeds this is refused as weak.
   double max_sigma_mm = 1.0;
   /// Below this angle between the lines of sight a pose counts as seen from nearly one direction.

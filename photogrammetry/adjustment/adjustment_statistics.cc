@@ -68,16 +68,14 @@ void find_ambiguous(const Network& network, AdjustmentResult& result) {
 
 }  // namespace
 
-void export_covariances(const Network& network, const BundleSystem& system, AdjustmentResult& result) {
-  result.epochs.resize(system.epochs.size());
-  result.photo_covariances.resize(network.photos.size());
-  for (std::size_t e = 0; e < system.epochs.size(); ++e) {
-    const EpochElimination& epoch = system.epochs[e];
-    result.epochs[e] = {epoch.inverse, spread(epoch.by_common, epoch.columns, result.layout.size)};
-    for (const PhotoElimination& photo : epoch.photos) {
-      result.photo_covariances[static_cast<std::size_t>(photo.photo)] = {
-          photo.inverse, photo.by_epoch, spread(photo.by_common, epoch.columns, result.layout.size)};
-    }
+void export_covariances(const EpochElimination& elimination, std::size_t epoch, AdjustmentResult& result) {
+  const auto full = [&](const Matrix6Xd& compact) {
+    return spread(compact, elimination.columns, result.layout.size);
+  };
+  result.epochs[epoch] = {elimination.inverse, full(elimination.by_common)};
+  for (const PhotoElimination& photo : elimination.photos) {
+    result.photo_covariances[static_cast<std::size_t>(photo.photo)] = {photo.inverse, photo.by_epoch,
+                                                                       full(photo.by_common)};
   }
 }
 

@@ -7,8 +7,8 @@
 
 namespace hexcal {
 
-/// Puts the covariances of epochs and photographs, in all common columns, into the result.
-void export_covariances(const Network& network, const BundleSystem& system, AdjustmentResult& result);
+/// Puts the covariances of an epoch and its photographs, in all common columns, into the result.
+void export_covariances(const EpochElimination& elimination, std::size_t epoch, AdjustmentResult& result);
 
 /// Residuals in px, redundancy and their summaries per photograph, marker and epoch; ambiguous photographs.
 void summarise_residuals(const Network& network, const std::vector<SightingTest>& tests,

@@ -97,7 +97,7 @@ void eliminate(EpochBlocks& blocks, double damping, EpochElimination& epoch, Red
     blocks_by_common.bottomRows<6>() = blocks.epoch_common;
     eliminated_by_common.bottomRows<6>() = epoch.by_common;
   }
-  if (count > 0) {
+  if (count > 0 && reduced.normal.size() > 0) {
     reduced.normal.triangularView<Eigen::Lower>() -= blocks_by_common.transpose() * eliminated_by_common;
   }
 }
@@ -113,7 +113,8 @@ void reduce_epoch(const Network& network, const NetworkGeometry& geometry,
   for (std::size_t i = 0; i < epoch.columns.size(); ++i) {
     compact[static_cast<std::size_t>(epoch.columns[i])] = static_cast<int>(i);
   }
-  reduced.normal.setZero(width, width);
+  const Eigen::Index summed = settings.common_moves ? width : 0;
+  reduced.normal.setZero(summed, summed);
   reduced.right.setZero(width);
   EpochBlocks blocks;
   blocks.epoch_common = Matrix6Xd::Zero(6, width);
@@ -161,6 +162,7 @@ void reduce_epoch(const Network& network, const NetworkGeometry& geometry,
       blocks.photo_common.back().col(i) += pc.col(a);
       if (moving) blocks.epoch_common.col(i) += ec.col(a);
       reduced.right[i] += cr[a];
+      if (!settings.common_moves) continue;
       for (Eigen::Index b = a; b < n; ++b) {  // the sighting's columns ascend
         reduced.normal(compact[static_cast<std::size_t>(common.column[static_cast<std::size_t>(b)])], i) +=
             cc(b, a);
@@ -168,6 +170,17 @@ void reduce_epoch(const Network& network, const NetworkGeometry& geometry,
     }
   }
   eliminate(blocks, damping, epoch, reduced);
+}
+
+// Lower triangle of an epoch into that of the whole; the epoch's columns ascend.
+void add_scattered(const ReducedEpoch& reduced, const std::vector<int>& columns, ReducedEpoch& sum) {
+  for (std::size_t b = 0; b < columns.size(); ++b) {
+    const auto col = static_cast<Eigen::Index>(b);
+    for (std::size_t a = b; a < columns.size(); ++a) {
+      sum.normal(columns[a], columns[b]) += reduced.normal(static_cast<Eigen::Index>(a), col);
+    }
+    sum.right[columns[b]] += reduced.right[col];
+  }
 }
 
 void add_row(const Eigen::RowVectorXd& row, double residual, BundleSystem& system) {
@@ -280,30 +293,25 @@ BundleSystem assemble_bundle(const Network& network, const NetworkGeometry& geom
     members[static_cast<std::size_t>(network.photos[p].epoch)].push_back(s);
   }
   BundleSystem system;
-  system.normal = Eigen::MatrixXd::Zero(layout.size, layout.size);
-  system.right = Eigen::VectorXd::Zero(layout.size);
+  const Eigen::Index summed = settings.common_moves ? layout.size : 0;
+  system.normal = Eigen::MatrixXd::Zero(summed, summed);
+  system.right = Eigen::VectorXd::Zero(summed);
   system.epochs.resize(num_epochs);
   const std::size_t num_sums = std::min(kSums, num_epochs);
   std::vector<ReducedEpoch> sums(num_sums);
   tbb::parallel_for(std::size_t{0}, num_sums, [&](std::size_t k) {
     ReducedEpoch& sum = sums[k];
-    sum.normal.setZero(layout.size, layout.size);
-    sum.right.setZero(layout.size);
+    sum.normal.setZero(summed, summed);
+    sum.right.setZero(summed);
     ReducedEpoch reduced;
     for (std::size_t e = k; e < num_epochs; e += num_sums) {
       if (members[e].empty()) continue;
       reduce_epoch(network, geometry, sightings, members[e], weights, layout, settings, damping,
                    system.epochs[e], reduced);
-      const std::vector<int>& columns = system.epochs[e].columns;
-      for (std::size_t b = 0; b < columns.size(); ++b) {
-        const auto col = static_cast<Eigen::Index>(b);
-        for (std::size_t a = b; a < columns.size(); ++a) {
-          sum.normal(columns[a], columns[b]) += reduced.normal(static_cast<Eigen::Index>(a), col);
-        }
-        sum.right[columns[b]] += reduced.right[col];
-      }
+      if (settings.common_moves) add_scattered(reduced, system.epochs[e].columns, sum);
     }
   });
+  if (!settings.common_moves) return system;
   for (const ReducedEpoch& sum : sums) {
     system.normal += sum.normal;
     system.right += sum.right;
@@ -319,12 +327,12 @@ BundleStep solve_bundle(const BundleSystem& system, const BundleLayout& layout,
   BundleStep step;
   step.common = Eigen::VectorXd::Zero(layout.size);
   const Eigen::Index kept = settings.interior_moves ? 0 : layout.num_interior;
-  const Eigen::Index n = layout.size - kept;
+  const Eigen::Index n = settings.common_moves ? layout.size - kept : 0;
   if (n > 0) {
     step.common.tail(n) = system.normal.bottomRightCorner(n, n).selfadjointView<Eigen::Lower>().ldlt().solve(
         system.right.tail(n));
   }
-  step.predicted_decrease = step.common.dot(system.right);
+  if (n > 0) step.predicted_decrease = step.common.dot(system.right);
   step.photo.assign(num_photos, Vector6d::Zero());
   for (const EpochElimination& epoch : system.epochs) {
     Eigen::VectorXd common(static_cast<Eigen::Index>(epoch.columns.size()));

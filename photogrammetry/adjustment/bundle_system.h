@@ -34,6 +34,9 @@ struct BundleSettings {
   std::vector<double> interior_inflation;  ///< per camera: factor on the calibration's sigmas
   double converged = 1e-9;                 ///< decrease of the sum of squares that is no longer worth a step
   bool interior_moves = true;              ///< false: kept, but its uncertainty goes into the covariances
+  /// false: all common parameters are known from elsewhere, with a covariance; only photographs and epochs
+  /// are estimated, and BundleSystem::normal stays empty.
+  bool common_moves = true;
 };
 
 /// Photograph after elimination: step = start - by_epoch * epoch step - by_common * common step.

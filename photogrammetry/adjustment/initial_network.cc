@@ -56,7 +56,8 @@ void orient_by_moving_body(const Network& network, const std::vector<Sighting>& 
 
 }  // namespace
 
-NetworkGeometry initial_network(const Network& network, std::vector<Sighting>& sightings) {
+NetworkGeometry initial_network(const Network& network, std::vector<Sighting>& sightings,
+                                const NetworkGeometry* map) {
   const int num_photos = static_cast<int>(network.photos.size());
   const int num_markers = static_cast<int>(network.markers.size());
   NetworkGeometry geometry;
@@ -78,7 +79,11 @@ NetworkGeometry initial_network(const Network& network, std::vector<Sighting>& s
     add_view(network, sighting, poses[s], Rigid3(), edge);
     edges.push_back(edge);
   }
-  const Assembly fixed = assemble_body(std::move(edges), num_photos, num_markers);
+  const auto assemble = [&](std::vector<AssemblyEdge> of_body, int num_frames) {
+    return map != nullptr ? orient_frames(of_body, num_frames, map->body_from_marker, map->has_marker)
+                          : assemble_body(std::move(of_body), num_frames, num_markers);
+  };
+  const Assembly fixed = assemble(std::move(edges), num_photos);
   geometry.camera_from_fixed = fixed.frame_from_body;
   geometry.has_photo = fixed.has_frame;
   geometry.body_from_marker = fixed.body_from_marker;
@@ -98,7 +103,7 @@ NetworkGeometry initial_network(const Network& network, std::vector<Sighting>& s
   }
   std::vector<AssemblyEdge> moving_edges;
   for (auto& [key, edge] : by_epoch) moving_edges.push_back(std::move(edge));
-  const Assembly moving = assemble_body(std::move(moving_edges), network.num_epochs, num_markers);
+  const Assembly moving = assemble(std::move(moving_edges), network.num_epochs);
   geometry.fixed_from_moving = moving.frame_from_body;
   geometry.has_epoch = moving.has_frame;
   for (std::size_t m = 0; m < network.markers.size(); ++m) {
@@ -107,6 +112,12 @@ NetworkGeometry initial_network(const Network& network, std::vector<Sighting>& s
     geometry.has_marker[m] = moving.has_marker[m];
   }
   orient_by_moving_body(network, sightings, poses, geometry);
+
+  if (map != nullptr) {
+    geometry.cameras = map->cameras;
+    geometry.shape_mm = map->shape_mm;
+    geometry.print_scale = map->print_scale;
+  }
 
   for (Sighting& sighting : sightings) {
     if (sighting.status != SightingStatus::used) continue;

@@ -11,7 +11,9 @@ namespace hexcal {
 /// other, best connected first, over the largest set connected by shared fixed markers; then the moving body
 /// is put together in the same way over the epochs; then photographs that see the moving body only. World and
 /// moving frame are those of a marker. What is not connected keeps has_* unset, and its sightings become
-/// `unoriented`.
-[[nodiscard]] NetworkGeometry initial_network(const Network& network, std::vector<Sighting>& sightings);
+/// `unoriented`. With a `map`, the geometry of an earlier adjustment of the same cameras and markers, those
+/// are taken from it and photographs and epochs are oriented by them.
+[[nodiscard]] NetworkGeometry initial_network(const Network& network, std::vector<Sighting>& sightings,
+                                              const NetworkGeometry* map = nullptr);
 
 }  // namespace hexcal

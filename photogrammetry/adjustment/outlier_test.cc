@@ -54,11 +54,16 @@ FollowedCommon followed_common(const EpochElimination& epoch, const PhotoElimina
   return followed;
 }
 
-// Covariance of a sighting's prediction (whitened, before the variance factor): errors of photograph, epoch
-// and common parameters expressed by independent parts (see PhotoElimination).
-Matrix8d predicted_covariance(const EpochElimination& epoch, const PhotoElimination& photo,
-                              const SightingJacobian& jacobian, bool moving, const CommonJacobian& common,
-                              const FollowedCommon& followed, const Eigen::MatrixXd& covariance) {
+// Covariance of a sighting's prediction (whitened, before the variance factor), by what the photograph and
+// the epoch add of their own and by the common parameters; see PhotoElimination.
+struct PredictedCovariance {
+  Matrix8d own, common;
+};
+
+PredictedCovariance predicted_covariance(const EpochElimination& epoch, const PhotoElimination& photo,
+                                         const SightingJacobian& jacobian, bool moving,
+                                         const CommonJacobian& common, const FollowedCommon& followed,
+                                         const Eigen::MatrixXd& covariance) {
   Matrix86d by_epoch = -jacobian.photo * photo.by_epoch;
   if (moving) by_epoch += jacobian.epoch;
   Eigen::Matrix<double, 8, 12> a;
@@ -74,10 +79,11 @@ Matrix8d predicted_covariance(const EpochElimination& epoch, const PhotoEliminat
       own(i, j) = covariance(common.column[static_cast<std::size_t>(i)], cj);
   }
   const Matrix8d crossed = a * (with_own * common.values.transpose());
-  Matrix8d predicted = a * followed.own * a.transpose() + crossed + crossed.transpose();
-  predicted += common.values * own * common.values.transpose();
-  predicted += jacobian.photo * photo.inverse * jacobian.photo.transpose();
-  if (epoch.has_pose) predicted += by_epoch * epoch.inverse * by_epoch.transpose();
+  PredictedCovariance predicted;
+  predicted.common = a * followed.own * a.transpose() + crossed + crossed.transpose() +
+                     common.values * own * common.values.transpose();
+  predicted.own = jacobian.photo * photo.inverse * jacobian.photo.transpose();
+  if (epoch.has_pose) predicted.own += by_epoch * epoch.inverse * by_epoch.transpose();
   return predicted;
 }
 
@@ -123,14 +129,23 @@ std::vector<SightingTest> test_sightings(const Network& network, const NetworkGe
       if (!sighting_residual(network, geometry, sighting, r, &jacobian)) continue;
       common_jacobian(layout, network.photos[static_cast<std::size_t>(sighting.photo)].camera, sighting,
                       jacobian, common);
-      Matrix8d predicted =
+      PredictedCovariance predicted =
           predicted_covariance(epoch, *photo, jacobian, moving, common, followed, covariance);
-      predicted /= settings.data_variance;
+      predicted.own /= settings.data_variance;
+      predicted.common /= settings.data_variance;
+      // What a sighting helped to estimate follows its error; what it had no part in adds its own.
+      const bool used = sighting.status == SightingStatus::used;
+      const bool helped_common = used && settings.common_moves;
       const int n = sighting.rows;
-      const double sign = sighting.status == SightingStatus::used ? -1.0 : 1.0;
-      const Eigen::MatrixXd q = Eigen::MatrixXd::Identity(n, n) + sign * predicted.topLeftCorner(n, n);
+      Matrix8d misfit = Matrix8d::Identity() + (used ? -1.0 : 1.0) * predicted.own;
+      misfit += (helped_common ? -1.0 : 1.0) * predicted.common;
+      const Eigen::MatrixXd q = misfit.topLeftCorner(n, n);
+      if (used) {
+        Matrix8d helped = predicted.own;
+        if (helped_common) helped += predicted.common;
+        tests[s].redundancy = 1 - helped.topLeftCorner(n, n).trace() / n;
+      }
       const Eigen::VectorXd rn = r.head(n) / std::sqrt(settings.data_variance);
-      tests[s].redundancy = sign < 0 ? q.trace() / n : 0.0;
       const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(q);
       const Eigen::VectorXd along = eigen.eigenvectors().transpose() * rn;
       tests[s].statistic = 0;

@@ -285,6 +285,22 @@ bool orient_frame(const std::vector<const AssemblyEdge*>& edges, const std::vect
   return least < kSupport;
 }
 
+Assembly orient_frames(const std::vector<AssemblyEdge>& edges, int num_frames,
+                       const std::vector<Rigid3>& body_from_marker, const std::vector<char>& has_marker) {
+  const auto frames = static_cast<std::size_t>(num_frames);
+  Assembly body{std::vector<Rigid3>(frames), body_from_marker, std::vector<char>(frames, 0), has_marker};
+  std::vector<std::vector<const AssemblyEdge*>> of_frame(frames);
+  for (const AssemblyEdge& edge : edges) {
+    if (edge.candidates.empty() || !has_marker[static_cast<std::size_t>(edge.marker)]) continue;
+    of_frame[static_cast<std::size_t>(edge.frame)].push_back(&edge);
+  }
+  for (std::size_t f = 0; f < frames; ++f) {
+    if (of_frame[f].empty()) continue;
+    body.has_frame[f] = orient_frame(of_frame[f], body_from_marker, body.frame_from_body[f]);
+  }
+  return body;
+}
+
 Assembly assemble_body(std::vector<AssemblyEdge> edges, int num_frames, int num_markers) {
   Assembly best;
   best.frame_from_body.resize(static_cast<std::size_t>(num_frames));

@@ -29,10 +29,14 @@ struct Assembly {
   std::vector<char> has_frame, has_marker;
 };
 
-/// Joins frames and markers of one rigid body that share edges. `prior_known` may hold poses already known.
-/// The body's frame is that of the marker it starts with; of several sets without connection the largest is
-/// taken.
+/// Joins frames and markers of one rigid body that share edges. The body's frame is that of the marker it
+/// starts with; of several sets without connection the largest is taken.
 [[nodiscard]] Assembly assemble_body(std::vector<AssemblyEdge> edges, int num_frames, int num_markers);
+
+/// Frames of a body whose markers are known already; those without a known marker stay open.
+[[nodiscard]] Assembly orient_frames(const std::vector<AssemblyEdge>& edges, int num_frames,
+                                     const std::vector<Rigid3>& body_from_marker,
+                                     const std::vector<char>& has_marker);
 
 /// Pose of one more frame of a body whose markers are known; false if none of the candidates fits.
 bool orient_frame(const std::vector<const AssemblyEdge*>& edges, const std::vector<Rigid3>& body_from_marker,

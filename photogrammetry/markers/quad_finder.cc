@@ -9,7 +9,7 @@ namespace hexcal {
 namespace {
 
 constexpr int kTile = 4;
-constexpr int kMinContrast = 18;            // encoded 8-bit values within a tile's neighbourhood
+constexpr int kMinTileContrast = 18;        // encoded 8-bit values within a tile's neighbourhood
 constexpr double kSmallOutline = 22;        // px of the searched image: looked at again at full size
 constexpr double kMinSupport = 0.55;        // share of the outline's hull that the outline follows
 constexpr double kPolygonTolerance = 0.03;  // of the perimeter
@@ -66,7 +66,7 @@ cv::Mat dark_mask(const cv::Mat& grey) {
       for (int x = 0; x < grey.cols; ++x) {
         const int tile = std::min(x / kTile, tiles.low.cols - 1);
         threshold[static_cast<std::size_t>(x)] =
-            high[tile] - low[tile] < kMinContrast
+            high[tile] - low[tile] < kMinTileContrast
                 ? std::uint8_t{0}
                 : static_cast<std::uint8_t>((high[tile] + low[tile] + 1) / 2);
       }
@@ -221,7 +221,7 @@ std::optional<Corners> look_closer(const cv::Mat& grey, const cv::Rect& region, 
   double low = 0;
   double high = 0;
   cv::minMaxLoc(large, &low, &high);
-  if (high - low < kMinContrast) return std::nullopt;
+  if (high - low < kMinTileContrast) return std::nullopt;
   const cv::Mat mask = large < 0.5 * (low + high);
   std::vector<std::vector<cv::Point>> outlines;
   cv::findContours(mask, outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);

@@ -5,6 +5,7 @@
 
 #include "tests/support/run_hexcal.h"
 #include "tests/support/sample_campaign.h"
+#include "tools/io/pose_table.h"
 
 namespace hexcal {
 namespace {
@@ -88,11 +89,70 @@ TEST_F(Measure, ASecondRunTakesTheDetectionsFromTheCacheAndGivesTheSameBytes) {
   ASSERT_EQ(measure().exit_code, 0);
   const std::string first = contents(lab_ / "results" / "poses.csv");
   const std::string covariance = contents(lab_ / "results" / "poses_covariance.csv");
+  fs::remove(lab_ / "results" / "cache" / "measurement.json");
   ASSERT_EQ(run_hexcal({"measure", lab_.string(), "--threads", "1"}).exit_code, 0);
   EXPECT_EQ(contents(lab_ / "results" / "poses.csv"), first);
   ASSERT_EQ(run_hexcal({"measure", lab_.string(), "--threads", "1", "--no-cache"}).exit_code, 0);
   EXPECT_EQ(contents(lab_ / "results" / "poses.csv"), first);
   EXPECT_EQ(contents(lab_ / "results" / "poses_covariance.csv"), covariance);
+}
+
+TEST_F(Measure, PosesOnAMapOfTheMarkersAreThoseOfOneAdjustmentWithinTheirSigmas) {
+  copy_sample_campaign(lab_ / "more", {"p002", "p003", "p004"});
+  for (const char* pose : {"p002", "p003", "p004"}) {
+    fs::rename(lab_ / "more" / "poses" / pose, lab_ / "poses" / pose);
+  }
+  ASSERT_EQ(measure().exit_code, 0);
+  const auto at_once = read_pose_table(lab_ / "results" / "poses.csv");
+  ASSERT_EQ(run_hexcal({"measure", lab_.string(), "--map-poses", "3"}).exit_code, 0);
+  const auto by_map = read_pose_table(lab_ / "results" / "poses.csv");
+  ASSERT_EQ(by_map.size(), at_once.size());
+  for (std::size_t i = 1; i < by_map.size(); ++i) {
+    ASSERT_TRUE(by_map[i].pose && by_map[i].sigma);
+    for (int k = 0; k < 6; ++k) {
+      const double sigma = (*by_map[i].sigma)[k];
+      EXPECT_NEAR(by_map[i].pose->vector()[k], at_once[i].pose->vector()[k], 4 * sigma) << i << " " << k;
+      EXPECT_GE(sigma, 0.8 * (*at_once[i].sigma)[k]) << i << " " << k;
+    }
+  }
+  const CommandResult one = run_hexcal({"measure", lab_.string(), "--map-poses", "1"});
+  EXPECT_EQ(one.exit_code, 2);
+  EXPECT_THAT(one.err, HasSubstr("map_poses: found 1, wanted 2 or more"));
+}
+
+TEST_F(Measure, WithNothingChangedTheAnswerOfTheLastRunIsGiven) {
+  const fs::path poses = lab_ / "results" / "poses.csv";
+  const CommandResult first = measure();
+  const CommandResult first_json = run_hexcal({"measure", lab_.string(), "--json"});
+  const std::string bytes = contents(poses);
+  const auto long_ago = fs::file_time_type::clock::now() - std::chrono::hours(1);
+  fs::last_write_time(poses, long_ago);
+  const CommandResult second = measure();
+  EXPECT_EQ(second.out, first.out);
+  EXPECT_EQ(second.exit_code, first.exit_code);
+  EXPECT_EQ(run_hexcal({"measure", lab_.string(), "--json"}).out, first_json.out);
+  EXPECT_EQ(fs::last_write_time(poses), long_ago) << "written again";
+
+  const fs::path epochs = lab_ / "results" / "epochs.csv";
+  const std::string whole = contents(epochs);
+  std::ofstream(epochs) << "half";
+  EXPECT_EQ(measure().out, first.out);
+  EXPECT_EQ(contents(epochs), whole);
+  EXPECT_EQ(contents(poses), bytes);
+
+  std::ofstream(lab_ / "camera.yaml", std::ios::app) << "# read again\n";
+  fs::last_write_time(poses, long_ago);
+  ASSERT_EQ(measure().exit_code, 0);
+  EXPECT_NE(fs::last_write_time(poses), long_ago);
+
+  const fs::path photograph = fs::directory_iterator(lab_ / "poses" / "p001")->path();
+  fs::last_write_time(poses, long_ago);
+  std::ofstream(photograph, std::ios::in | std::ios::out).seekp(200) << "a few other bytes";
+  (void)measure();
+  EXPECT_NE(fs::last_write_time(poses), long_ago);
+
+  fs::remove(photograph);
+  EXPECT_NE(measure().out, first.out);
 }
 
 }  // namespace

@@ -5,7 +5,9 @@
 #include <Eigen/Geometry>
 #include <chrono>
 #include <cmath>
+#include <numeric>
 
+#include "photogrammetry/adjustment/marker_map.h"
 #include "tests/support/observation_scene.h"
 #include "tests/support/rigid_matchers.h"
 
@@ -315,6 +317,65 @@ TEST(Adjustment, SmallDistantMarkersResolveTheirTwofoldAmbiguity) {
   ASSERT_EQ(result.status, AdjustmentStatus::ok) << result.reason;
   EXPECT_NEAR(result.sigma0, 1.0, 0.08);
   for (const ResidualSummary& photo : result.photo_residuals) EXPECT_EQ(photo.rejected, 0);
+}
+
+std::vector<int> first_epochs(int count) {
+  std::vector<int> epochs(static_cast<std::size_t>(count));
+  std::iota(epochs.begin(), epochs.end(), 0);
+  return epochs;
+}
+
+TEST(MarkerMap, NoiseFreeSceneIsRecoveredExactly) {
+  const ObservationScene scene = make_observation_scene({});
+  const AdjustmentResult result = adjust_network_by_map(scene.network, first_epochs(4), {});
+  ASSERT_EQ(result.status, AdjustmentStatus::ok) << result.reason;
+  const PoseErrors errors = pose_errors(scene, result);
+  EXPECT_LT(errors.rms_um, 1e-4);
+  EXPECT_LT(errors.rms_mdeg, 1e-4);
+  EXPECT_LT(result.rms_px, 1e-7);
+}
+
+TEST(MarkerMap, EpochsOnTheMapStateHonestSigmasAndLoseLittle) {
+  double normalised = 0;
+  double by_map_um = 0;
+  double at_once_um = 0;
+  constexpr int kSeeds = 5;
+  for (unsigned seed = 0; seed < kSeeds; ++seed) {
+    ObservationSceneOptions options;
+    options.num_epochs = 24;
+    options.noise_px = 0.01;
+    options.interior_sigma = 1;
+    options.seed = 300 + seed;
+    const ObservationScene scene = make_observation_scene(options);
+    const AdjustmentResult by_map = adjust_network_by_map(scene.network, first_epochs(8), {});
+    ASSERT_EQ(by_map.status, AdjustmentStatus::ok) << by_map.reason;
+    normalised += mean_normalised_square(scene, by_map) / kSeeds;
+    by_map_um += pose_errors(scene, by_map).rms_um / kSeeds;
+    at_once_um += pose_errors(scene, adjust_network(scene.network, {})).rms_um / kSeeds;
+    for (const ResidualSummary& photo : by_map.photo_residuals) EXPECT_EQ(photo.rejected, 0);
+  }
+  EXPECT_GT(normalised, 0.7);
+  EXPECT_LT(normalised, 1.4);
+  EXPECT_LT(by_map_um, 1.5 * at_once_um);
+}
+
+TEST(MarkerMap, AMovedMarkerIsLeftOutOfItsEpochAlone) {
+  ObservationSceneOptions options;
+  options.noise_px = 0.01;
+  ObservationScene scene = make_observation_scene(options);
+  int moved = 0;
+  for (NetworkPhoto& photo : scene.network.photos) {
+    if (photo.epoch != 9) continue;
+    for (Eigen::Vector2d& corner : photo.markers[0].corners_px) corner.x() += 2;
+    ++moved;
+  }
+  const AdjustmentResult result = adjust_network_by_map(scene.network, first_epochs(6), {});
+  ASSERT_EQ(result.status, AdjustmentStatus::ok) << result.reason;
+  for (std::size_t p = 0; p < scene.network.photos.size(); ++p) {
+    EXPECT_EQ(result.photo_residuals[p].rejected, scene.network.photos[p].epoch == 9 ? 1 : 0);
+  }
+  EXPECT_EQ(result.epoch_residuals[9].rejected, moved);
+  EXPECT_LT(pose_errors(scene, result).rms_um, 2);
 }
 
 TEST(Adjustment, SameInputGivesTheSameBits) {

@@ -216,6 +216,7 @@ PhotographObservations observe_image(const OpenCampaign& open, std::size_t image
 
 ExtractOptions extract_options(const MeasureRequest& request) {
   ExtractOptions options;
+  options.map_poses = request.map_poses;
   if (request.interior_fixed) options.adjustment.interior = AdjustmentOptions::Interior::fixed;
   return options;
 }

@@ -167,6 +167,12 @@ void add_measure_command(CLI::App& app, Action& action) {
       ->check(CLI::IsMember({"refine", "fixed"}))
       ->capture_default_str();
   command
+      ->add_option(
+          "--map-poses", request.map_poses,
+          "For thousands of poses: map the markers from this many, measure the others one by one on it "
+          "(0: one adjustment of all)")
+      ->check(CLI::NonNegativeNumber);
+  command
       ->add_option("--threads", request.threads, "Photographs worked on at a time (default: all processors)")
       ->check(CLI::NonNegativeNumber);
   command->add_flag("--overlays", request.overlays,

@@ -1,0 +1,231 @@
+#include "photogrammetry/adjustment/adjustment_stages.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "kinematics/geometry/median.h"
+
+namespace hexcal {
+namespace {
+
+constexpr int kMaxIterations = 50;
+constexpr int kRobustRounds = 6;
+constexpr int kOutlierRounds = 8;
+constexpr double kMedianChi2Of8 = 7.344;
+constexpr double kRobustWidth = 4.0;  // robust limit over the robust standard deviation of a sighting
+constexpr double kReadmission = 0.8;  // a rejected sighting returns below this share of the limit
+
+Eigen::MatrixXd symmetric_inverse(const Eigen::MatrixXd& m) {
+  const Eigen::VectorXd scale = m.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * m * scale.asDiagonal();
+  const Eigen::MatrixXd inverse = scaled.ldlt().solve(Eigen::MatrixXd::Identity(m.rows(), m.cols()));
+  return scale.asDiagonal() * (0.5 * (inverse + inverse.transpose())) * scale.asDiagonal();
+}
+
+// Covariance of the common parameters. With a fixed interior orientation the other parameters follow its
+// error by -S22^-1 S21, and its covariance is the calibration's.
+Eigen::MatrixXd common_covariance(const BundleSystem& system, const BundleLayout& layout,
+                                  const BundleSettings& settings) {
+  const Eigen::Index k = layout.num_interior;
+  const Eigen::Index n = layout.size - k;
+  if (settings.interior_moves || k == 0) return symmetric_inverse(system.normal);
+  Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(k, k);
+  for (std::size_t c = 0; c < layout.interior.size(); ++c) {
+    for (int i = layout.interior[c]; i < layout.interior[c] + layout.interior_basis[c].cols(); ++i) {
+      prior(i, i) = settings.interior_inflation[c] * settings.interior_inflation[c];
+    }
+  }
+  const Eigen::MatrixXd own = symmetric_inverse(system.normal.bottomRightCorner(n, n));
+  const Eigen::MatrixXd follow = -own * system.normal.bottomLeftCorner(n, k);
+  Eigen::MatrixXd covariance(layout.size, layout.size);
+  covariance << prior, prior * follow.transpose(), follow * prior, own + follow * prior * follow.transpose();
+  return covariance;
+}
+
+// Degrees of freedom that priors give: trace of (prior information * covariance).
+double prior_information(const AdjustmentJob& job, const AdjustmentStage& stage) {
+  const BundleLayout& layout = stage.layout;
+  BundleSettings settings = stage.settings;
+  // The prior's normal matrix alone: a system without any sighting.
+  const std::vector<double> none(stage.sightings.size(), 0.0);
+  const BundleSystem priors =
+      assemble_bundle(job.network, stage.geometry, stage.sightings, none, layout, settings, 0);
+  const Eigen::Index k = settings.interior_moves ? 0 : layout.num_interior;
+  const Eigen::Index n = layout.size - k;
+  return priors.normal.bottomRightCorner(n, n).cwiseProduct(stage.covariance.bottomRightCorner(n, n)).sum();
+}
+
+BundleLayout without_columns(const BundleLayout& full) {
+  BundleLayout layout;
+  for (const Eigen::MatrixXd& basis : full.interior_basis) {
+    layout.interior.push_back(0);
+    layout.interior_basis.emplace_back(basis.rows(), 0);
+    layout.interior_inverse.emplace_back(0, basis.rows());
+  }
+  layout.interior_start = full.interior_start;
+  layout.marker_pose.assign(full.marker_pose.size(), -1);
+  layout.marker_shape = layout.marker_pose;
+  return layout;
+}
+
+void solve(const AdjustmentJob& job, AdjustmentStage& stage, double robust_limit,
+           const BundleSettings& settings) {
+  // What is held needs no columns until the solution is analysed.
+  BundleSolution solution =
+      solve_bundle_adjustment(job.network, stage.geometry, stage.sightings,
+                              stage.settings.common_moves ? stage.layout : without_columns(stage.layout),
+                              settings, robust_limit, kMaxIterations);
+  if (!stage.settings.common_moves) solution.system.reset();
+  stage.geometry = std::move(solution.geometry);
+  stage.converged = solution.converged;
+  stage.iterations += solution.iterations;
+  stage.system = std::move(solution.system);
+  stage.squares = 0;
+  for (const double q : solution.squares) stage.squares += std::max(0.0, q);
+}
+
+// While outliers are sought, a tenth of a standard deviation is near enough.
+void solve_roughly(const AdjustmentJob& job, AdjustmentStage& stage, double robust_limit) {
+  BundleSettings settings = stage.settings;
+  settings.converged = 0.01;
+  solve(job, stage, robust_limit, settings);
+}
+
+// A rejected marker of which three corners fit comes back without the fourth.
+bool readmit_by_corners(const AdjustmentJob& job, const AdjustmentStage& stage, Sighting& sighting,
+                        double limit_of_6) {
+  Sighting best;
+  double least = limit_of_6;
+  for (std::size_t c = 0; c < 4; ++c) {
+    Sighting trial = sighting;
+    trial.corner_used.fill(true);
+    trial.corner_used[c] = false;
+    if (!whiten(trial)) continue;
+    const std::vector<Sighting> one{trial};
+    const double statistic = test_sightings(job.network, stage.geometry, one, stage.layout, stage.settings,
+                                            *stage.system, stage.covariance)[0]
+                                 .statistic;
+    if (statistic >= least) continue;
+    least = statistic;
+    best = trial;
+  }
+  if (best.marker < 0) return false;
+  sighting = best;
+  return true;
+}
+
+}  // namespace
+
+void solve(const AdjustmentJob& job, AdjustmentStage& stage) { solve(job, stage, 0, stage.settings); }
+
+void analyse(const AdjustmentJob& job, AdjustmentStage& stage) {
+  std::vector<double> weights(stage.sightings.size(), 0);
+  double rows = 0;
+  for (std::size_t s = 0; s < weights.size(); ++s) {
+    if (stage.sightings[s].status != SightingStatus::used) continue;
+    weights[s] = 1;
+    rows += stage.sightings[s].rows;
+  }
+  if (!stage.system) {
+    stage.system = assemble_bundle(job.network, stage.geometry, stage.sightings, weights, stage.layout,
+                                   stage.settings, 0);
+  }
+  double unknowns = 0;
+  if (stage.settings.common_moves) {
+    stage.covariance = common_covariance(*stage.system, stage.layout, stage.settings);
+    unknowns = stage.layout.size - (stage.settings.interior_moves ? 0 : stage.layout.num_interior);
+  }
+  for (const EpochElimination& epoch : stage.system->epochs) {
+    unknowns += 6.0 * static_cast<double>(epoch.photos.size()) + (epoch.has_pose ? 6 : 0);
+  }
+  stage.redundancy = rows - unknowns;
+  if (stage.settings.common_moves) stage.redundancy += prior_information(job, stage);
+}
+
+std::vector<SightingTest> test_stage(const AdjustmentJob& job, const AdjustmentStage& stage) {
+  return test_sightings(job.network, stage.geometry, stage.sightings, stage.layout, stage.settings,
+                        *stage.system, stage.covariance);
+}
+
+double solve_robustly(const AdjustmentJob& job, AdjustmentStage& stage) {
+  double limit2 = 0;
+  for (int round = 0; round < kRobustRounds; ++round) {
+    const BundleSolution at = solve_bundle_adjustment(job.network, stage.geometry, stage.sightings,
+                                                      stage.layout, stage.settings, 0, 0);
+    std::vector<double> squares;
+    for (const double q : at.squares) {
+      if (q >= 0) squares.push_back(q);
+    }
+    const double next = kRobustWidth * kRobustWidth * 8 * std::max(1.0, median(squares) / kMedianChi2Of8);
+    if (round > 0 && next > 0.5 * limit2) break;
+    limit2 = next;
+    solve_roughly(job, stage, std::sqrt(limit2));
+  }
+  return limit2;
+}
+
+void drop_unsupported(const AdjustmentJob& job, AdjustmentStage& stage) {
+  const Network& network = job.network;
+  std::vector<int> photos(network.photos.size(), 0);
+  std::vector<int> epochs(static_cast<std::size_t>(network.num_epochs), 0);
+  std::vector<int> markers(network.markers.size(), 0);
+  for (const Sighting& sighting : stage.sightings) {
+    if (sighting.status != SightingStatus::used) continue;
+    const auto p = static_cast<std::size_t>(sighting.photo);
+    const auto m = static_cast<std::size_t>(sighting.marker);
+    ++photos[p];
+    ++markers[m];
+    if (network.markers[m].body == Body::moving) ++epochs[static_cast<std::size_t>(network.photos[p].epoch)];
+  }
+  for (std::size_t p = 0; p < photos.size(); ++p) stage.geometry.has_photo[p] &= photos[p] > 0;
+  for (std::size_t e = 0; e < epochs.size(); ++e) stage.geometry.has_epoch[e] &= epochs[e] > 0;
+  for (std::size_t m = 0; m < markers.size(); ++m) stage.geometry.has_marker[m] &= markers[m] > 0;
+}
+
+void reject_outliers(const AdjustmentJob& job, AdjustmentStage& stage, double robust_limit2) {
+  const BundleSolution at = solve_bundle_adjustment(job.network, stage.geometry, stage.sightings,
+                                                    stage.layout, stage.settings, 0, 0);
+  for (std::size_t s = 0; s < stage.sightings.size(); ++s) {
+    if (at.squares[s] > robust_limit2) stage.sightings[s].status = SightingStatus::outlier;
+  }
+  const double base8 = chi2_quantile(8, job.options.outlier_probability);
+  const double base6 = chi2_quantile(6, job.options.outlier_probability);
+  for (int round = 0; round < kOutlierRounds; ++round) {
+    solve_roughly(job, stage, 0);
+    analyse(job, stage);
+    const std::vector<SightingTest> tests = test_stage(job, stage);
+    std::vector<double> used;
+    double worst = 0;
+    for (std::size_t s = 0; s < tests.size(); ++s) {
+      if (stage.sightings[s].status != SightingStatus::used) continue;
+      used.push_back(tests[s].statistic * 8 / stage.sightings[s].rows);
+      worst = std::max(worst, tests[s].statistic);
+    }
+    // Covariances that promise too much must not make outliers of everything.
+    const double factor = std::max(1.0, median(used) / kMedianChi2Of8);
+    bool changed = false;
+    for (std::size_t s = 0; s < tests.size(); ++s) {
+      Sighting& sighting = stage.sightings[s];
+      const double limit = factor * (sighting.rows == 8 ? base8 : base6);
+      if (sighting.status == SightingStatus::used) {
+        // The worst first: others may only suffer from them.
+        if (tests[s].statistic <= limit || tests[s].statistic < 0.2 * worst) continue;
+        sighting.status = SightingStatus::outlier;
+        changed = true;
+      } else if (sighting.status == SightingStatus::outlier && round + 2 < kOutlierRounds) {
+        if (tests[s].statistic < kReadmission * limit) {
+          sighting.status = SightingStatus::used;
+          changed = true;
+        } else if (sighting.rows == 8 &&
+                   readmit_by_corners(job, stage, sighting, kReadmission * factor * base6)) {
+          sighting.status = SightingStatus::used;
+          changed = true;
+        }
+      }
+    }
+    if (!changed) break;
+  }
+}
+
+}  // namespace hexcal
