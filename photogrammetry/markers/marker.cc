@@ -16,7 +16,12 @@
 #include <functional>
 #include <map>
 #include <mutex>
+#include <opencv2/core/version.hpp>
+#if CV_VERSION_MAJOR > 4 || CV_VERSION_MINOR >= 7
+#include <opencv2/objdetect/aruco_dictionary.hpp>
+#else
 #include <opencv2/aruco.hpp>
+#endif
 
 #include "kinematics/geometry/input_error.h"
 
@@ -42,7 +47,7 @@ constexpr AprilTagFamily kAprilTagFamilies[] = {
 
 struct ArucoDictionary {
   const char* name;
-  cv::aruco::PREDEFINED_DICTIONARY_NAME id;
+  decltype(cv::aruco::DICT_4X4_50) id;  // the enumeration's name differs between versions
 };
 
 #define HEXCAL_DICTIONARY(name) \
@@ -87,16 +92,26 @@ MarkerFamily april_tag_family(const AprilTagFamily& source) {
   return family;
 }
 
+cv::aruco::Dictionary library_dictionary(const ArucoDictionary& source) {
+#if CV_VERSION_MAJOR > 4 || CV_VERSION_MINOR >= 7
+  return cv::aruco::getPredefinedDictionary(source.id);
+#else
+  return *cv::aruco::getPredefinedDictionary(source.id);
+#endif
+}
+
 MarkerFamily aruco_family(const ArucoDictionary& source) {
   MarkerFamily family{source.name, {}};
-  const cv::Ptr<cv::aruco::Dictionary> dictionary = cv::aruco::getPredefinedDictionary(source.id);
-  const int cells = dictionary->markerSize + 2;
-  for (int id = 0; id < dictionary->bytesList.rows; ++id) {
-    cv::Mat image;
-    dictionary->drawMarker(id, cells, image, 1);
+  const cv::aruco::Dictionary dictionary = library_dictionary(source);
+  const int cells = dictionary.markerSize + 2;  // with the black border
+  for (int id = 0; id < dictionary.bytesList.rows; ++id) {
+    const cv::Mat bits = cv::aruco::Dictionary::getBitsFromByteList(dictionary.bytesList.row(id), cells - 2);
     MarkerPattern pattern{cells, static_cast<double>(cells), {}};
     for (int y = 0; y < cells; ++y) {
-      for (int x = 0; x < cells; ++x) pattern.white.push_back(image.at<std::uint8_t>(y, x) > 127 ? 1 : 0);
+      for (int x = 0; x < cells; ++x) {
+        const bool border = x == 0 || y == 0 || x == cells - 1 || y == cells - 1;
+        pattern.white.push_back(!border && bits.at<std::uint8_t>(y - 1, x - 1) != 0 ? 1 : 0);
+      }
     }
     family.patterns.push_back(std::move(pattern));
   }

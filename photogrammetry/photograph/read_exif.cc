@@ -32,7 +32,11 @@ class ExifReader {
   [[nodiscard]] std::optional<int> integer(const char* key) const {
     const auto entry = data_.findKey(Exiv2::ExifKey(key));
     if (entry == data_.end() || entry->count() == 0) return std::nullopt;
+#if EXIV2_TEST_VERSION(0, 28, 0)
+    const auto value = static_cast<int>(entry->toInt64());
+#else
     const auto value = static_cast<int>(entry->toLong());
+#endif
     if (!entry->value().ok()) return std::nullopt;
     return value;
   }

@@ -3,7 +3,12 @@
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
 
+#include <opencv2/core/version.hpp>
+#if CV_VERSION_MAJOR > 4 || CV_VERSION_MINOR >= 7
+#include <opencv2/objdetect/aruco_detector.hpp>
+#else
 #include <opencv2/aruco.hpp>
+#endif
 
 namespace hexcal {
 namespace {
@@ -44,16 +49,25 @@ std::vector<MarkerObservation> april_tags(const cv::Mat& grey, float decimate) {
 std::vector<MarkerObservation> aruco_markers(const cv::Mat& grey, cv::aruco::CornerRefineMethod method,
                                              double shift) {
   const auto dictionary = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_APRILTAG_36h11);
-  const auto parameters = cv::aruco::DetectorParameters::create();
-  parameters->cornerRefinementMethod = method;
+#if CV_VERSION_MAJOR > 4 || CV_VERSION_MINOR >= 7
+  cv::aruco::DetectorParameters parameters;
+#else
+  const auto created = cv::aruco::DetectorParameters::create();
+  cv::aruco::DetectorParameters& parameters = *created;
+#endif
+  parameters.cornerRefinementMethod = method;
   // Its defaults are for photographs of a megapixel: wider thresholding windows, and the patterns as they
   // are.
-  parameters->adaptiveThreshWinSizeMax = 103;
-  parameters->adaptiveThreshWinSizeStep = 40;
-  parameters->minMarkerPerimeterRate = 0.01;
+  parameters.adaptiveThreshWinSizeMax = 103;
+  parameters.adaptiveThreshWinSizeStep = 40;
+  parameters.minMarkerPerimeterRate = 0.01;
   std::vector<std::vector<cv::Point2f>> found;
   std::vector<int> ids;
-  cv::aruco::detectMarkers(grey, dictionary, found, ids, parameters);
+#if CV_VERSION_MAJOR > 4 || CV_VERSION_MINOR >= 7
+  cv::aruco::ArucoDetector(dictionary, parameters).detectMarkers(grey, found, ids);
+#else
+  cv::aruco::detectMarkers(grey, dictionary, found, ids, created);
+#endif
   std::vector<MarkerObservation> markers;
   for (std::size_t i = 0; i < ids.size(); ++i) {
     // Its AprilTag patterns are those of the library turned by half a turn.
