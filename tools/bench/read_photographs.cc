@@ -1,5 +1,5 @@
-// Only decodes photographs, with as many threads as the processors it may use: by cv::imread in colour, the measure of
-// tools/bench/stages.py, or as hexcal does (luminance, EXIF, SHA-256).
+// Only decodes photographs, with as many threads as the processors it may use: by cv::imread in colour, the
+// measure of tools/bench/stages.py, or as hexcal does (luminance, EXIF, SHA-256).
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
