@@ -1,6 +1,7 @@
 #include "pose_extract/feature_fit.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -103,10 +104,10 @@ Shape start(Feature::Kind kind, const Eigen::Matrix3Xd& points, const Eigen::Mat
   Eigen::Matrix3d across = Eigen::Matrix3d::Identity();
   if (kind != Feature::Kind::sphere) across -= shape.direction * shape.direction.transpose();
   const Eigen::Matrix3Xd flat = across * centred;
-  Eigen::MatrixX4d a(points.cols(), 4);
+  Eigen::MatrixXd a(points.cols(), 4);
   a << 2 * flat.transpose(), Eigen::VectorXd::Ones(points.cols());
   const Eigen::VectorXd b = flat.colwise().squaredNorm();
-  const Eigen::Vector4d solution = a.jacobiSvd(Eigen::ComputeThinU | Eigen::ComputeThinV).solve(b);
+  const Eigen::Vector4d solution = Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>(a).solve(b);
   const Eigen::Vector3d centre = across * solution.head<3>();
   shape.place += centre;
   shape.radius = std::sqrt(std::max(0.0, solution[3] + centre.squaredNorm()));
@@ -148,8 +149,8 @@ FittedFeature fit_feature(Feature::Kind kind, const Eigen::Matrix3Xd& points, co
   }
   Shape shape = start(kind, chosen, faces);
   for (int iteration = 0; iteration < kFitIterations; ++iteration) {
-    Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
-    Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(6, 6);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(6);
     for (const Eigen::Index i : kept) {
       double r[2] = {0, 0};
       const int rows = distances(kind, shape, points.col(i), centres.col(i), r);
@@ -172,7 +173,7 @@ FittedFeature fit_feature(Feature::Kind kind, const Eigen::Matrix3Xd& points, co
       }
     }
     // The place may slide along a plane, line or axis: the smallest step is taken.
-    Eigen::CompleteOrthogonalDecomposition<Eigen::Matrix<double, 6, 6>> decomposition;
+    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition;
     decomposition.setThreshold(1e-10);
     decomposition.compute(normal);
     const Eigen::VectorXd step = decomposition.solve(right);
