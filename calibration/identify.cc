@@ -49,6 +49,29 @@ Eigen::Matrix<double, 6, 2> stroke_range_of(const PlatformGeometry& nominal,
   return range;
 }
 
+// Why the observations cannot be used at all; empty if they can.
+std::string unusable(const ObservationSet& observations) {
+  if (observations.poses.empty()) return "there are no poses";
+  for (std::size_t i = 0; i < observations.poses.size(); ++i) {
+    const PoseObservation& pose = observations.poses[i];
+    const Vector6d measured = pose.measured.vector();
+    for (Eigen::Index k = 0; k < 6; ++k) {
+      if (!std::isfinite(pose.readings[k])) {
+        return fmt::format("pose {}: found {} as reading q{}, wanted a number", pose.id, pose.readings[k],
+                           k + 1);
+      }
+      if (pose.observed[static_cast<std::size_t>(k)] && !std::isfinite(measured[k])) {
+        return fmt::format("pose {}: found {} as measured coordinate {}, wanted a number", pose.id,
+                           measured[k], k + 1);
+      }
+    }
+    if (!observations.covariance(i).allFinite()) {
+      return fmt::format("pose {}: its covariance is not finite", pose.id);
+    }
+  }
+  return "";
+}
+
 // The state of one identification.
 class Identification {
  public:
@@ -342,6 +365,11 @@ class Identification {
 IdentifyResult identify(const PlatformGeometry& nominal, const ObservationSet& observations,
                         const IdentifyOptions& options) {
   options.validate();
+  if (std::string why = unusable(observations); !why.empty()) {
+    IdentifyResult refused;
+    refused.reason = std::move(why);
+    return refused;
+  }
   return Identification(nominal, observations, options).run();
 }
 

@@ -1,6 +1,7 @@
 #include "photogrammetry/adjustment/adjustment_stages.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -13,13 +14,24 @@ constexpr int kMaxIterations = 50;
 constexpr int kRobustRounds = 6;
 constexpr int kOutlierRounds = 8;
 constexpr double kMedianChi2Of8 = 7.344;
-constexpr double kRobustWidth = 4.0;  // robust limit over the robust standard deviation of a sighting
-constexpr double kReadmission = 0.8;  // a rejected sighting returns below this share of the limit
+constexpr double kRobustWidth = 4.0;     // robust limit over the robust standard deviation of a sighting
+constexpr double kReadmission = 0.8;     // a rejected sighting returns below this share of the limit
+constexpr double kUndetermined = 1e-13;  // of unit-diagonal normal equations: beyond what rounding leaves
 
+// Inverse of normal equations. Combinations of parameters that nothing determines get a very large variance
+// instead of one of any size and sign that rounding makes.
 Eigen::MatrixXd symmetric_inverse(const Eigen::MatrixXd& m) {
   const Eigen::VectorXd scale = m.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * m * scale.asDiagonal();
-  const Eigen::MatrixXd inverse = scaled.ldlt().solve(Eigen::MatrixXd::Identity(m.rows(), m.cols()));
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(scaled);
+  Eigen::MatrixXd inverse;
+  if (ldlt.info() == Eigen::Success && ldlt.isPositive() && ldlt.vectorD().minCoeff() > kUndetermined) {
+    inverse = ldlt.solve(Eigen::MatrixXd::Identity(m.rows(), m.cols()));
+  } else {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
+    inverse = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(kUndetermined).cwiseInverse().asDiagonal() *
+              eigen.eigenvectors().transpose();
+  }
   return scale.asDiagonal() * (0.5 * (inverse + inverse.transpose())) * scale.asDiagonal();
 }
 

@@ -1,0 +1,153 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "photogrammetry/adjustment/adjustment.h"
+#include "tests/support/observation_scene.h"
+
+// Observations as no camera makes them: the adjustment names what is wrong or gives finite numbers, and what
+// it gives while some observations are spoilt is what the healthy ones give.
+
+namespace hexcal {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+ObservationScene small_scene() {
+  ObservationSceneOptions options;
+  options.num_epochs = 4;
+  options.noise_px = 0.01;
+  return make_observation_scene(options);
+}
+
+// Everything that would reach a file is finite, variances are not negative; or there is a reason.
+void expect_sane(const AdjustmentResult& result) {
+  if (result.status != AdjustmentStatus::ok) {
+    EXPECT_NE(result.reason, "");
+    EXPECT_NE(result.reason, "not run");
+  }
+  EXPECT_TRUE(std::isfinite(result.sigma0));
+  EXPECT_TRUE(std::isfinite(result.rms_px));
+  EXPECT_TRUE(std::isfinite(result.redundancy_total));
+  EXPECT_TRUE(std::isfinite(result.interior_chi2));
+  if (result.status == AdjustmentStatus::nothing_connected) return;
+  EXPECT_TRUE(result.common_covariance.allFinite());
+  for (std::size_t e = 0; e < result.geometry.has_epoch.size(); ++e) {
+    if (!result.geometry.has_epoch[e]) continue;
+    EXPECT_TRUE(result.geometry.fixed_from_moving[e].translation.allFinite());
+    EXPECT_TRUE(result.geometry.fixed_from_moving[e].rotation.coeffs().allFinite());
+    const Matrix6d covariance = epoch_covariance(result, static_cast<int>(e), static_cast<int>(e));
+    EXPECT_TRUE(covariance.allFinite());
+    EXPECT_GE(covariance.diagonal().minCoeff(), 0) << "epoch " << e;
+  }
+  for (std::size_t p = 0; p < result.geometry.has_photo.size(); ++p) {
+    if (!result.geometry.has_photo[p]) continue;
+    EXPECT_TRUE(result.geometry.camera_from_fixed[p].translation.allFinite());
+  }
+  for (const Vector8d& residual : result.residuals_px) EXPECT_TRUE(residual.allFinite());
+  for (const double redundancy : result.redundancy) EXPECT_TRUE(std::isfinite(redundancy));
+}
+
+struct Torture {
+  const char* name;
+  std::function<void(Network&)> spoil;
+  bool harmless;  // one marker of one photograph: the rest is as if it had not been there
+};
+
+MarkerObservation& victim(Network& network) { return network.photos[4].markers[2]; }
+
+const std::vector<Torture>& tortures() {
+  static const std::vector<Torture> all{
+      {"NanCorner", [](Network& n) { victim(n).corners_px[1].x() = kNan; }, true},
+      {"InfiniteCorner", [](Network& n) { victim(n).corners_px[1].y() = kInfinity; }, true},
+      {"FarCorner", [](Network& n) { victim(n).corners_px[3] *= 1e12; }, true},
+      {"AllCornersTheSame", [](Network& n) { victim(n).corners_px.fill(victim(n).corners_px[0]); }, true},
+      {"CollinearCorners",
+       [](Network& n) {
+         auto& c = victim(n).corners_px;
+         for (std::size_t i = 1; i < 4; ++i) c[i] = c[0] + static_cast<double>(i) * Eigen::Vector2d(30, 20);
+       },
+       true},
+      {"NanCovariance", [](Network& n) { victim(n).covariance_px2(3, 3) = kNan; }, true},
+      {"NegativeCovariance", [](Network& n) { victim(n).covariance_px2 *= -1; }, true},
+      {"HugeCovariance", [](Network& n) { victim(n).covariance_px2 *= 1e20; }, true},
+      {"ZeroCovariance", [](Network& n) { victim(n).covariance_px2.setZero(); }, false},
+      {"UnknownId", [](Network& n) { victim(n).id = 577; }, true},
+      {"NoMarkersAtAll",
+       [](Network& n) {
+         for (NetworkPhoto& photo : n.photos) photo.markers.clear();
+       },
+       false},
+      {"OnePhotograph", [](Network& n) { n.photos.resize(1); }, false},
+      {"NoPhotograph", [](Network& n) { n.photos.clear(); }, false},
+      {"EveryPhotographTwice",
+       [](Network& n) {
+         const std::vector<NetworkPhoto> once = n.photos;
+         n.photos.insert(n.photos.end(), once.begin(), once.end());
+       },
+       false},
+      {"OneStationOnly",
+       [](Network& n) {
+         std::vector<NetworkPhoto> kept;
+         for (std::size_t p = 0; p < n.photos.size(); p += 3) kept.push_back(n.photos[p]);
+         n.photos = kept;
+       },
+       false},
+      {"TheSamePhotographInEveryEpoch",
+       [](Network& n) {
+         for (NetworkPhoto& photo : n.photos) photo.markers = n.photos[0].markers;
+       },
+       false},
+      {"SizesInMetres",
+       [](Network& n) {
+         for (NetworkMarker& marker : n.markers) marker.size_mm /= 1000;
+       },
+       false},
+      {"SizesInMicrometres",
+       [](Network& n) {
+         for (NetworkMarker& marker : n.markers) marker.size_mm *= 1000;
+       },
+       false},
+      {"OneSizeAThousandTimesTooLarge", [](Network& n) { n.markers[3].size_mm *= 1000; }, false},
+      {"FocalLengthAThousandTimesTooLong", [](Network& n) { n.cameras[0].model.parameters[0] *= 1000; },
+       false},
+      {"FocalLengthAThousandTimesTooShort", [](Network& n) { n.cameras[0].model.parameters[0] /= 1000; },
+       false},
+      {"CovariancesAMillionTimesTooSmall",
+       [](Network& n) {
+         for (NetworkPhoto& photo : n.photos)
+           for (MarkerObservation& seen : photo.markers) seen.covariance_px2 *= 1e-6;
+       },
+       false},
+      {"EveryMarkerTheSameId",
+       [](Network& n) {
+         for (NetworkPhoto& photo : n.photos)
+           for (MarkerObservation& seen : photo.markers) seen.id = 0;
+       },
+       false},
+  };
+  return all;
+}
+
+class AdjustmentTorture : public ::testing::TestWithParam<std::size_t> {};
+
+TEST_P(AdjustmentTorture, HasAReasonOrFiniteNumbers) {
+  const Torture& torture = tortures()[GetParam()];
+  ObservationScene scene = small_scene();
+  torture.spoil(scene.network);
+  const AdjustmentResult result = adjust_network(scene.network, {});
+  expect_sane(result);
+  if (!torture.harmless) return;
+  ASSERT_EQ(result.status, AdjustmentStatus::ok) << result.reason;
+  EXPECT_LT(result.rms_px, 0.02);
+  EXPECT_LT(result.sigma0, 1.2);
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, AdjustmentTorture, ::testing::Range(std::size_t{0}, tortures().size()),
+                         [](const auto& torture) { return std::string(tortures()[torture.param].name); });
+
+}  // namespace
+}  // namespace hexcal
