@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <fstream>
+#include <map>
 
+#include "tests/support/output_files.h"
 #include "tests/support/run_hexcal.h"
 #include "tests/support/sample_campaign.h"
 #include "tools/io/pose_table.h"
@@ -75,6 +77,36 @@ TEST_F(Measure, ATruncatedPhotographIsLeftOutAndNamed) {
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.out, HasSubstr("photograph p001/DSC_0004.jpg: unreadable"));
   EXPECT_THAT(contents(lab_ / "results" / "poses.csv"), HasSubstr("p001,ok"));
+  EXPECT_GT(expect_finite_numbers(lab_ / "results"), 8);
+}
+
+TEST_F(Measure, APoseThatFailsLeavesEmptyCellsAndNoNan) {
+  for (const fs::directory_entry& entry : fs::directory_iterator(lab_ / "poses" / "p001")) {
+    fs::resize_file(entry.path(), 30000);
+  }
+  EXPECT_EQ(measure().exit_code, 1);
+  EXPECT_THAT(contents(lab_ / "results" / "poses.csv"),
+              AllOf(HasSubstr("p001,no_usable_photographs: "), HasSubstr("file,,,,,,,,,,,,,0,0,,")));
+  EXPECT_GT(expect_finite_numbers(lab_ / "results"), 8);
+}
+
+// Every file of the results; the cache is no result.
+std::map<std::string, std::string> result_files(const fs::path& results) {
+  std::map<std::string, std::string> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(results)) {
+    if (entry.is_regular_file()) files[entry.path().filename().string()] = contents(entry.path());
+  }
+  return files;
+}
+
+TEST_F(Measure, OneTwoAndFourThreadsWriteTheSameBytes) {
+  std::map<std::string, std::string> first;
+  for (const char* threads : {"1", "2", "4", "4"}) {
+    ASSERT_EQ(run_hexcal({"measure", lab_.string(), "--no-cache", "--threads", threads}).exit_code, 0);
+    if (first.empty()) first = result_files(lab_ / "results");
+    EXPECT_EQ(result_files(lab_ / "results"), first) << threads;
+  }
+  EXPECT_GT(first.size(), 8u);
 }
 
 TEST_F(Measure, OnePhotographOfAPoseGivesAPoseWithALargerSigma) {

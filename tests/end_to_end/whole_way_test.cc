@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "tests/support/output_files.h"
 #include "tests/support/run_hexcal.h"
 #include "tools/io/pose_table.h"
 
@@ -71,6 +72,9 @@ TEST(WholeWay, FromPhotographsToCorrectedCommands) {
   EXPECT_EQ(after.poses, 12);
   EXPECT_LT(after.mm, 0.05 * before.mm) << before.mm;
   EXPECT_LT(after.deg, 0.05 * before.deg) << before.deg;
+
+  run({"report", lab});
+  EXPECT_GT(expect_finite_numbers(folder.path()), 40);
 }
 
 }  // namespace
