@@ -8,12 +8,14 @@
 #include <csetjmp>
 
 #include "photogrammetry/photograph/decoders.h"
+#include "photogrammetry/photograph/raster_header.h"
 
 namespace hexcal {
 namespace {
 
 struct ErrorState {
   jpeg_error_mgr manager{};
+  jpeg_progress_mgr progress{};
   std::jmp_buf escape{};
   std::array<char, JMSG_LENGTH_MAX> message{};
   bool damaged = false;
@@ -44,15 +46,30 @@ void on_message(j_common_ptr info, int level) {
 
 void print_nothing(j_common_ptr) {}
 
+// Cameras' and editors' progressive JPEGs have about ten scans; each of thousands would take a pass over the
+// whole picture.
+constexpr int kMaxScans = 100;
+// Of libjpeg itself, which keeps all coefficients of a progressive JPEG.
+constexpr long kMaxMemoryBytes = 640L << 20;
+
+void stop_at_many_scans(j_common_ptr info) {
+  if (reinterpret_cast<j_decompress_ptr>(info)->input_scan_number <= kMaxScans) return;
+  auto* state = reinterpret_cast<ErrorState*>(info->err);
+  std::snprintf(state->message.data(), state->message.size(), "more than %d scans", kMaxScans);
+  std::longjmp(state->escape, 1);
+}
+
 // Everything between setjmp and the last libjpeg call; holds no object with a destructor.
 bool decode(jpeg_decompress_struct& info, ErrorState& errors, std::string_view bytes, cv::Mat& grey,
-            bool& too_large) {
+            std::string& too_large) {
   if (setjmp(errors.escape) != 0) return false;
   jpeg_create_decompress(&info);
+  info.mem->max_memory_to_use = kMaxMemoryBytes;
+  info.progress = &errors.progress;
   jpeg_mem_src(&info, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
   if (jpeg_read_header(&info, TRUE) != JPEG_HEADER_OK) return false;
-  too_large = static_cast<long long>(info.image_width) * info.image_height > kMaxPixels;
-  if (too_large) return false;
+  too_large = size_fault(info.image_width, info.image_height, bytes.size());
+  if (!too_large.empty()) return false;
   info.out_color_space = JCS_GRAYSCALE;
   jpeg_start_decompress(&info);
   grey.create(static_cast<int>(info.output_height), static_cast<int>(info.output_width), CV_8UC1);
@@ -74,11 +91,12 @@ DecodedImage decode_jpeg_luma(std::string_view bytes) {
   errors.manager.error_exit = on_error;
   errors.manager.emit_message = on_message;
   errors.manager.output_message = print_nothing;
-  bool too_large = false;
+  errors.progress.progress_monitor = stop_at_many_scans;
+  std::string too_large;
   const bool done = decode(info, errors, bytes, image.grey, too_large);
-  if (too_large) {
+  if (!too_large.empty()) {
     image.status = PhotographStatus::too_large;
-    image.reason = std::to_string(info.image_width) + " x " + std::to_string(info.image_height) + " pixels";
+    image.reason = too_large;
   } else if (!done) {
     image.reason = errors.message.data();
     image.grey.release();

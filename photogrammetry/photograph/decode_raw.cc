@@ -4,6 +4,8 @@
 #include <memory>
 
 #include "photogrammetry/photograph/decoders.h"
+#include "photogrammetry/photograph/file_signature.h"
+#include "photogrammetry/photograph/raster_header.h"
 
 namespace hexcal {
 namespace {
@@ -24,9 +26,9 @@ void even_out_green(LibRaw& raw, cv::Mat& green) {
   }
 }
 
-}  // namespace
+constexpr unsigned kMaxRawMegabytes = 640;
 
-DecodedImage decode_raw_green(std::string_view bytes) {
+DecodedImage develop(std::string_view bytes) {
   DecodedImage image;
   image.tone = ToneCurve::linear;
   // LibRaw's object is too large for the stack of a worker thread.
@@ -37,6 +39,7 @@ DecodedImage decode_raw_green(std::string_view bytes) {
   params.no_auto_bright = 1;
   params.output_color = 0;
   params.user_flip = 0;
+  params.max_raw_memory_mb = kMaxRawMegabytes;
   params.user_qual = 0;  // bilinear: linear in the samples, so edges keep their place
   std::fill(std::begin(params.user_mul), std::end(params.user_mul), 1.0F);
   const auto failed = [&image](int code) {
@@ -50,12 +53,16 @@ DecodedImage decode_raw_green(std::string_view bytes) {
     return image;
   }
   const auto& sizes = raw->imgdata.sizes;
-  if (static_cast<long long>(sizes.raw_width) * sizes.raw_height > kMaxPixels) {
+  image.reason = size_fault(sizes.raw_width, sizes.raw_height, bytes.size());
+  if (!image.reason.empty()) {
     image.status = PhotographStatus::too_large;
-    image.reason = std::to_string(sizes.raw_width) + " x " + std::to_string(sizes.raw_height) + " pixels";
     return image;
   }
   if (failed(raw->unpack()) || failed(raw->dcraw_process())) return image;
+  if (raw->imgdata.image == nullptr || sizes.iheight < 1 || sizes.iwidth < 1) {
+    image.reason = "no picture in it";
+    return image;
+  }
   image.grey.create(sizes.iheight, sizes.iwidth, CV_16UC1);
   for (int y = 0; y < image.grey.rows; ++y) {
     const ushort(*row)[4] = raw->imgdata.image + static_cast<std::ptrdiff_t>(y) * image.grey.cols;
@@ -64,6 +71,24 @@ DecodedImage decode_raw_green(std::string_view bytes) {
   even_out_green(*raw, image.grey);
   image.status = PhotographStatus::ok;
   return image;
+}
+
+}  // namespace
+
+DecodedImage decode_raw_green(std::string_view bytes) {
+  DecodedImage failed;
+  if (file_signature(bytes) != FileSignature::tiff) {
+    failed.reason = "neither NEF nor DNG";
+    return failed;
+  }
+  try {
+    return develop(bytes);
+  } catch (const std::exception& error) {
+    failed.reason = error.what();
+  } catch (...) {  // LibRaw throws numbers
+    failed.reason = "damaged";
+  }
+  return failed;
 }
 
 }  // namespace hexcal

@@ -16,9 +16,6 @@ struct DecodedImage {
   ToneCurve tone = ToneCurve::srgb;
 };
 
-/// More pixels than any camera at hand has: such a header is damaged, or an attack on the memory.
-constexpr long long kMaxPixels = 250'000'000;
-
 /// Luma only, through libjpeg. Damaged data is `truncated`, with libjpeg's words.
 [[nodiscard]] DecodedImage decode_jpeg_luma(std::string_view bytes);
 
@@ -26,10 +23,10 @@ constexpr long long kMaxPixels = 250'000'000;
 /// balance, curve, brightening or rotation: NEF, DNG and whatever else LibRaw reads.
 [[nodiscard]] DecodedImage decode_raw_green(std::string_view bytes);
 
-/// PNG, TIFF and the other formats of OpenCV, 8 or 16 bit; colour becomes luma.
+/// PNG and TIFF, 8 or 16 bit; colour becomes luma.
 [[nodiscard]] DecodedImage decode_raster(std::string_view bytes);
 
-/// EXIF and maker notes; sizes are 0 if the file has none.
+/// EXIF and maker notes of a JPEG, PNG or TIFF; sizes are 0 if the file has none.
 [[nodiscard]] PhotographInfo read_exif(std::string_view bytes);
 
 }  // namespace hexcal

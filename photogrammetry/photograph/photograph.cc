@@ -3,13 +3,14 @@
 #include <fstream>
 
 #include "photogrammetry/photograph/decoders.h"
+#include "photogrammetry/photograph/file_signature.h"
 #include "photogrammetry/photograph/photograph_format.h"
 #include "photogrammetry/photograph/sha256.h"
 
 namespace hexcal {
 namespace {
 
-constexpr std::uintmax_t kMaxFileBytes = 1U << 30;
+constexpr std::uintmax_t kMaxFileBytes = 1U << 29;
 
 struct FileBytes {
   PhotographStatus status = PhotographStatus::unreadable;
@@ -36,7 +37,7 @@ FileBytes read_bytes(const std::filesystem::path& path) {
 }
 
 DecodedImage decode(const std::filesystem::path& path, std::string_view bytes) {
-  if (bytes.substr(0, 2) == "\xFF\xD8") return decode_jpeg_luma(bytes);
+  if (file_signature(bytes) == FileSignature::jpeg) return decode_jpeg_luma(bytes);
   if (is_raw(photograph_format(path))) return decode_raw_green(bytes);
   return decode_raster(bytes);
 }

@@ -2,6 +2,7 @@
 #include <mutex>
 
 #include "photogrammetry/photograph/decoders.h"
+#include "photogrammetry/photograph/file_signature.h"
 
 namespace hexcal {
 namespace {
@@ -83,6 +84,7 @@ PhotographInfo info_from(const Exiv2::Image& image) {
 }  // namespace
 
 PhotographInfo read_exif(std::string_view bytes) {
+  if (file_signature(bytes) == FileSignature::other) return {};
   static std::once_flag prepared;
   std::call_once(prepared, [] {
     Exiv2::LogMsg::setLevel(Exiv2::LogMsg::mute);

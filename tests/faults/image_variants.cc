@@ -75,9 +75,9 @@ cv::Mat pixels_of(const std::string& jpeg) {
                       cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
 }
 
-std::string encoded(const cv::Mat& pixels, const std::string& extension) {
+std::string encoded(const cv::Mat& pixels, const std::string& extension, const std::vector<int>& parameters) {
   std::vector<std::uint8_t> bytes;
-  cv::imencode(extension, pixels, bytes);
+  cv::imencode(extension, pixels, bytes, parameters);
   return {bytes.begin(), bytes.end()};
 }
 

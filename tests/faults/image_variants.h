@@ -2,6 +2,7 @@
 
 #include <opencv2/core/mat.hpp>
 #include <string>
+#include <vector>
 
 #include "tools/synthetic/jpeg_file.h"
 
@@ -10,8 +11,10 @@ namespace hexcal {
 /// Pixels of a JPEG's bytes, CV_8UC3.
 [[nodiscard]] cv::Mat pixels_of(const std::string& jpeg);
 
-/// Bytes of a picture in the format of an extension (".png", ".tif", ...), as OpenCV writes it.
-[[nodiscard]] std::string encoded(const cv::Mat& pixels, const std::string& extension);
+/// Bytes of a picture in the format of an extension (".png", ".tif", ...), as OpenCV writes it with these
+/// parameters of its own.
+[[nodiscard]] std::string encoded(const cv::Mat& pixels, const std::string& extension,
+                                  const std::vector<int>& parameters = {});
 
 /// sRGB values of 8 bit as 16 bit of the same encoding.
 [[nodiscard]] cv::Mat sixteen_bit(const cv::Mat& pixels);

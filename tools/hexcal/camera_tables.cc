@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tools/hexcal/terminal.h"
+#include "tools/io/json_text.h"
 
 namespace hexcal {
 namespace {
@@ -117,7 +118,7 @@ std::string camera_json(const CameraCalibration& calibration, const CameraReport
                                   {"distance_mm", row.distance_mm},
                                   {"blur_px", row.blur_px}});
   }
-  if (calibration.status != CalibrationStatus::ok) return out.dump(2);
+  if (calibration.status != CalibrationStatus::ok) return json_text(out, 2);
   const CameraModel& camera = calibration.fit.adjustment.state.camera;
   out["model"] = lens_model_name(camera.lens);
   out["board"] = board_freedom_name(calibration.variant.board);
@@ -142,7 +143,7 @@ std::string camera_json(const CameraCalibration& calibration, const CameraReport
     if (trial.cross_validation_px) entry["cross_validation_px"] = *trial.cross_validation_px;
     out["models"].push_back(entry);
   }
-  return out.dump(2);
+  return json_text(out, 2);
 }
 
 }  // namespace hexcal

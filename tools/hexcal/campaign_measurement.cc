@@ -158,7 +158,8 @@ CampaignLock::CampaignLock(const fs::path& results) {
   const fs::path path = results / ".lock";
   folder_ = fs::weakly_canonical(results, error);
   if (held_folders().count(folder_) != 0) return;
-  file_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  refuse_linked_folders(results);
+  file_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644);
   if (file_ < 0)
     throw InputError(fmt::format("{}: cannot be written: {}", path.string(), std::strerror(errno)));
   if (::flock(file_, LOCK_EX | LOCK_NB) != 0) {

@@ -21,11 +21,16 @@ std::optional<double> capture_seconds(const std::string& text) {
   int hour = 0;
   int minute = 0;
   double second = 0;
-  if (std::sscanf(text.c_str(), "%d:%u:%u %d:%d:%lf", &year, &month, &day, &hour, &minute, &second) != 6) {
+  if (std::sscanf(text.c_str(), "%4d:%2u:%2u %2d:%2d:%5lf", &year, &month, &day, &hour, &minute, &second) !=
+      6) {
     return std::nullopt;
   }
-  const std::chrono::sys_days date =
-      std::chrono::year(year) / std::chrono::month(month) / std::chrono::day(day);
+  const std::chrono::year_month_day day_of_year(std::chrono::year(year), std::chrono::month(month),
+                                                std::chrono::day(day));
+  const bool time_ok = hour >= 0 && hour < 24 && minute >= 0 && minute < 60 && second >= 0 && second < 61;
+  if (year < 1900 || year > 9999 || month > 12 || day > 31 || !day_of_year.ok() || !time_ok)
+    return std::nullopt;
+  const std::chrono::sys_days date = day_of_year;
   return static_cast<double>(date.time_since_epoch().count()) * 86400 + hour * 3600 + minute * 60 + second;
 }
 

@@ -19,6 +19,7 @@
 #include "tools/io/atomic_file.h"
 #include "tools/io/calibration_tables.h"
 #include "tools/io/camera_file.h"
+#include "tools/io/json_text.h"
 #include "tools/io/sheet_file.h"
 #include "tools/io/template_pdf.h"
 #include "tools/report/camera_page.h"
@@ -123,7 +124,7 @@ int compare(const CameraFlags& flags) {
                                      {"difference_max_px", d.max_px},
                                      {"expected_rms_px", result.expected_rms_px},
                                      {"significant", result.significant}};
-    fmt::print("{}\n", out.dump(2));
+    fmt::print("{}\n", json_text(out, 2));
     return kDone;
   }
   fmt::print(

@@ -12,6 +12,7 @@
 #include "tools/hexcal/photograph_heads.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/io/hexapod_file.h"
+#include "tools/io/json_text.h"
 #include "tools/io/pose_table.h"
 
 namespace hexcal {
@@ -126,7 +127,7 @@ int check(const MeasureRequest& request, bool as_json) {
                                       {"photographs", open.listing.images.size()},
                                       {"problems", findings.count()},
                                       {"findings", findings.json()}};
-    fmt::print("{}\n", json.dump(1));
+    fmt::print("{}\n", json_text(json, 1));
   } else {
     fmt::print("{} photographs in {} poses; {}\n", open.listing.images.size(), open.listing.poses.size(),
                findings.count() == 0 ? "nothing wrong found" : fmt::format("{} problems", findings.count()));

@@ -47,6 +47,7 @@ void resolve(CompensateFlags& flags) {
   if (!flags.campaign.empty()) {
     const Campaign campaign = read_campaign(flags.campaign);
     const fs::path results = campaign.folder / "results";
+    refuse_linked_folders(results);
     if (flags.hexapod.empty() && campaign.hexapod) flags.hexapod = *campaign.hexapod;
     if (flags.targets.empty() && campaign.targets) flags.targets = *campaign.targets;
     if (flags.legs.empty() && campaign.legs) flags.legs = *campaign.legs;

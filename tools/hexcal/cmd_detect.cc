@@ -16,6 +16,7 @@
 #include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/camera_file.h"
+#include "tools/io/json_text.h"
 #include "tools/io/observations_file.h"
 
 namespace hexcal {
@@ -136,7 +137,7 @@ int run_detect(const DetectFlags& flags) {
                     {"not_usable", not_usable(photograph)}});
   }
   if (flags.json) {
-    fmt::print("{}\n", nlohmann::ordered_json{{"photographs", rows}, {"markers", markers}}.dump(2));
+    fmt::print("{}\n", json_text(nlohmann::ordered_json{{"photographs", rows}, {"markers", markers}}, 2));
   } else {
     fmt::print("{}{} photographs, {} markers in {}\n", table.text(), set.photographs.size(), markers,
                flags.output.string());

@@ -12,6 +12,7 @@
 #include "kinematics/geometry/input_error.h"
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/terminal.h"
+#include "tools/io/json_text.h"
 #include "tools/io/pose_table.h"
 
 namespace hexcal {
@@ -175,7 +176,7 @@ int run_evaluate(const EvaluateFlags& flags) {
     out["tables"].push_back(entry);
   }
   if (flags.json) {
-    fmt::print("{}\n", out.dump(2));
+    fmt::print("{}\n", json_text(out, 2));
     return some_failed ? kSomeFailed : kDone;
   }
   if (tables.size() == 1) fmt::print("{}\n", paper_table(tables[0], tables[0]));

@@ -11,6 +11,7 @@
 #include "tools/hexcal/measurement_record.h"
 #include "tools/hexcal/photograph_heads.h"
 #include "tools/hexcal/terminal.h"
+#include "tools/io/json_text.h"
 
 namespace hexcal {
 namespace {
@@ -70,7 +71,7 @@ int list_as_json(const OpenCampaign& open, const std::vector<HeadFinding>& findi
   }
   for (const SkippedFile& file : open.listing.skipped)
     json["skipped"].push_back({{"file", file.name}, {"reason", file.reason}});
-  fmt::print("{}\n", json.dump(1));
+  fmt::print("{}\n", json_text(json, 1));
   const bool any_bad = std::ranges::any_of(findings, [](const HeadFinding& finding) { return finding.bad; });
   return any_bad ? kSomeFailed : kDone;
 }

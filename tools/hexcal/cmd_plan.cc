@@ -16,6 +16,7 @@
 #include "tools/io/camera_file.h"
 #include "tools/io/campaign_file.h"
 #include "tools/io/hexapod_file.h"
+#include "tools/io/json_text.h"
 #include "tools/io/pose_table.h"
 
 namespace hexcal {
@@ -145,7 +146,7 @@ int run_plan(PlanFlags flags) {
                                   {"orientation_deg", plan.by_count[i].orientation_rad * kDegPerRad},
                                   {"unplanned_position_mm", plan.random_by_count[i].position_mm}});
     }
-    fmt::print("{}\n", out.dump(2));
+    fmt::print("{}\n", json_text(out, 2));
     return kDone;
   }
   TextTable table({"poses", "planned_mm", "planned_deg", "unplanned_mm", "unplanned_deg"});

@@ -8,6 +8,7 @@
 #include "tools/hexcal/report_input.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/json_text.h"
 #include "tools/report/comparison_page.h"
 
 namespace hexcal {
@@ -85,7 +86,7 @@ int write_report(const ReportFlags& flags) {
                                       {"next_steps", verdict.next_steps},
                                       {"page", out.string()},
                                       {"figures", figures}};
-    fmt::print("{}\n", json.dump(1));
+    fmt::print("{}\n", json_text(json, 1));
     return kDone;
   }
   fmt::print("{}: {}\n", coloured(light_words(verdict.light), colour_of(verdict.light)), verdict.headline);

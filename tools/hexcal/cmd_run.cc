@@ -25,7 +25,7 @@ struct RunFlags {
 int run_stage(void (*add)(CLI::App&, Action&), std::vector<std::string> arguments, bool json) {
   if (json) {
     fmt::print("{}\"{}\": ", arguments[0] == "measure" ? "{" : ", ", arguments[0]);
-    arguments.emplace_back("--json");
+    arguments.insert(arguments.begin() + 1, "--json");
   } else {
     fmt::print("{}\n", coloured("== hexcal " + fmt::format("{}", fmt::join(arguments, " ")), Colour::bold));
   }
@@ -45,15 +45,17 @@ int run_run(const RunFlags& flags) {
   const Campaign campaign = read_campaign(flags.campaign);
   const CampaignLock lock(campaign.folder / "results");
   auto held = std::make_unique<SuggestionsHeld>();
-  int worst = run_stage(add_measure_command, {"measure", flags.campaign}, flags.json);
+  // As an argument of the stages; a name that begins with a dash is no flag.
+  const std::string folder = flags.campaign.starts_with('-') ? "./" + flags.campaign : flags.campaign;
+  int worst = run_stage(add_measure_command, {"measure", folder}, flags.json);
   if (campaign.hexapod && campaign.targets) {
-    std::vector<std::string> arguments{"compensate", flags.campaign};
+    std::vector<std::string> arguments{"compensate", folder};
     if (!flags.method.empty()) arguments.insert(arguments.end(), {"--method", flags.method});
     worst = std::max(worst, run_stage(add_compensate_command, arguments, flags.json));
   } else if (!flags.json) {
     fmt::print("not compensated: campaign.yaml names no {}\n\n", campaign.hexapod ? "targets" : "hexapod");
   }
-  worst = std::max(worst, run_stage(add_report_command, {"report", flags.campaign}, flags.json));
+  worst = std::max(worst, run_stage(add_report_command, {"report", folder}, flags.json));
   held.reset();
   if (flags.json) {
     fmt::print("}}\n");

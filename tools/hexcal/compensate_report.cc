@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tools/hexcal/terminal.h"
+#include "tools/io/json_text.h"
 
 namespace hexcal {
 namespace {
@@ -237,7 +238,7 @@ std::string compensation_json(const CalibrationReport& report, const Observation
     out["commands"].push_back(entry);
   }
   for (const auto& path : written) out["written"].push_back(path.string());
-  return out.dump(2) + "\n";
+  return json_text(out, 2) + "\n";
 }
 
 }  // namespace hexcal

@@ -3,11 +3,13 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <opencv2/core/utils/logger.hpp>
 
 #include "kinematics/geometry/input_error.h"
 #include "tools/hexcal/commands.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/hexcal/version.h"
+#include "tools/io/atomic_file.h"
 
 namespace {
 
@@ -22,6 +24,7 @@ bool wants_json(const CLI::App& app) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // a photograph's status says it
   std::signal(SIGXFSZ, SIG_IGN);  // a file size limit is an error of the write that meets it, with words
   CLI::App app{"hexcal: calibration of a Stewart platform by photographs", "hexcal"};
   app.set_version_flag("--version", fmt::format("hexcal {}", hexcal::kVersion));
@@ -50,7 +53,7 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "hexcal: {} (see hexcal --help)\n", error.what());
     return hexcal::kInputError;
   } catch (const hexcal::InputError& error) {
-    fmt::print(stderr, "hexcal: {}\n", error.what());
+    fmt::print(stderr, "hexcal: {}\n", hexcal::one_line(error.what()));
     return hexcal::kInputError;
   } catch (const std::exception& error) {
     fmt::print(stderr,

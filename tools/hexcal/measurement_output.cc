@@ -11,6 +11,7 @@
 #include "tools/io/atomic_file.h"
 #include "tools/io/colmap_model.h"
 #include "tools/io/covariance_file.h"
+#include "tools/io/json_text.h"
 #include "tools/io/observations_file.h"
 #include "tools/io/point_cloud_file.h"
 #include "tools/io/pose_table.h"
@@ -264,7 +265,7 @@ std::string measurement_json(const CampaignObservations& observations, const Cam
   for (const SkippedFile& file : listing.skipped)
     json["skipped"].push_back({{"file", file.name}, {"reason", file.reason}});
   json["warnings"] = result.warnings;
-  return json.dump(1) + "\n";
+  return json_text(json, 1) + "\n";
 }
 
 int measurement_exit_code(const CampaignResult& result) {

@@ -11,6 +11,8 @@
 #include <map>
 #include <stdexcept>
 
+#include "tools/io/atomic_file.h"
+
 namespace hexcal {
 namespace {
 
@@ -136,6 +138,7 @@ TextTable::TextTable(std::vector<std::string> header)
 
 void TextTable::add_row(std::vector<std::string> cells, Colour colour) {
   cells.resize(header_.size());
+  for (std::string& cell : cells) cell = one_line(cell);  // names of files may hold anything
   rows_.push_back({std::move(cells), colour});
 }
 

@@ -1,12 +1,14 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "photogrammetry/photograph/file_signature.h"
 #include "photogrammetry/photograph/photograph.h"
-#include "photogrammetry/photograph/photograph_format.h"
 #include "tools/hexcal/network_part.h"
 
 namespace hexcal {
@@ -37,9 +39,15 @@ int decoding_flags(int width_px, int wanted_px) {
   return flags | cv::IMREAD_IGNORE_ORIENTATION;
 }
 
+// By its content; a file's name may promise anything.
+bool is_jpeg(const fs::path& path) {
+  std::array<char, 3> head{};
+  std::ifstream(path, std::ios::binary).read(head.data(), head.size());
+  return file_signature({head.data(), head.size()}) == FileSignature::jpeg;
+}
+
 cv::Mat decoded(const fs::path& path, int width_px, int wanted_px) {
-  if (photograph_format(path) == PhotographFormat::jpeg)
-    return cv::imread(path.string(), decoding_flags(width_px, wanted_px));
+  if (is_jpeg(path)) return cv::imread(path.string(), decoding_flags(width_px, wanted_px));
   const Photograph photograph = read_photograph(path);
   if (photograph.status != PhotographStatus::ok) return {};
   cv::Mat grey = photograph.grey;

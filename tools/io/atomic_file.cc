@@ -24,6 +24,8 @@ namespace {
 }
 
 constexpr std::string_view kTemporaryEnding = ".tmp";
+constexpr std::size_t kMaxFileBytes = std::size_t{1} << 30;
+constexpr std::size_t kMaxStreamBytes = std::size_t{1} << 26;
 
 // ".NAME.PROCESS.NUMBER.tmp": two threads may write one name at a time.
 std::string temporary_name(const std::string& name) {
@@ -118,11 +120,17 @@ std::string read_file(const std::filesystem::path& path) {
   }
   std::ifstream in(path, std::ios::binary);
   if (!in) fail(path, "read");
-  // In one piece; what has no size beforehand (a pipe) in pieces.
-  const std::uintmax_t expected = std::filesystem::file_size(path, error);
+  // In one piece; what has no size beforehand (a pipe) in pieces. A file may grow or shrink meanwhile.
+  const bool regular = std::filesystem::is_regular_file(path, error);
+  const std::uintmax_t expected = regular ? std::filesystem::file_size(path, error) : 0;
+  const std::size_t limit = regular ? kMaxFileBytes : kMaxStreamBytes;
+  const auto refuse_size = [&path, limit](std::uintmax_t found) {
+    if (found > limit) throw InputError(fmt::format("{}: holds more than {} bytes", path.string(), limit));
+  };
+  if (!error) refuse_size(expected);
   std::string contents(error ? 0 : static_cast<std::size_t>(expected), '\0');
   std::size_t size = 0;
-  while (in) {
+  while (in && size <= limit) {
     if (size == contents.size()) {
       if (in.peek() == std::char_traits<char>::eof()) break;
       contents.resize(size + 65536);
@@ -131,13 +139,17 @@ std::string read_file(const std::filesystem::path& path) {
     size += static_cast<std::size_t>(in.gcount());
   }
   if (in.bad()) fail(path, "read");
+  refuse_size(size);
   contents.resize(size);
   return contents;
 }
 
 void write_file_atomically(const std::filesystem::path& path, std::string_view contents, Keep keep) {
   TemporaryFile file(path, contents);
-  if (keep == Keep::always) file.flush();
+  if (keep == Keep::always) {
+    remove_abandoned_files(path.has_parent_path() ? path.parent_path() : ".", path.filename().string());
+    file.flush();
+  }
   file.rename_to_target();
 }
 
@@ -149,14 +161,42 @@ void write_files_atomically(const std::vector<std::pair<std::filesystem::path, s
   for (TemporaryFile& file : written) file.rename_to_target();
 }
 
-void remove_abandoned_files(const std::filesystem::path& folder) {
+void refuse_linked_folders(const std::filesystem::path& results) {
+  std::error_code error;
+  const auto refuse = [&error](const std::filesystem::path& folder) {
+    if (!std::filesystem::is_symlink(folder, error)) return;
+    throw InputError(fmt::format("{}: is a link, wanted a folder; results are not written through links",
+                                 folder.string()));
+  };
+  refuse(results);
+  for (const auto& entry : std::filesystem::directory_iterator(results, error)) {
+    if (entry.is_directory(error)) refuse(entry.path());
+  }
+}
+
+void remove_abandoned_files(const std::filesystem::path& folder, std::string_view of_file) {
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    const auto maker = maker_of(entry.path().filename().string());
+    const std::string name = entry.path().filename().string();
+    if (!of_file.empty() && !name.starts_with(fmt::format(".{}.", of_file))) continue;
+    const auto maker = maker_of(name);
     const bool alive = maker && (::kill(*maker, 0) == 0 || errno == EPERM);
     std::error_code ignored;
     if (maker && !alive) std::filesystem::remove(entry.path(), ignored);
   }
+}
+
+std::string one_line(std::string_view text) {
+  std::string line;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7F) {
+      line += fmt::format("\\x{:02X}", byte);
+    } else {
+      line += c;
+    }
+  }
+  return line;
 }
 
 std::string provenance_line(std::string_view version, std::string_view command,
@@ -165,7 +205,7 @@ std::string provenance_line(std::string_view version, std::string_view command,
   for (const auto& input : inputs) {
     std::error_code error;
     if (!std::filesystem::is_regular_file(input, error)) continue;
-    line += fmt::format("  {} sha256:{}", input.filename().string(), sha256_hex(read_file(input)));
+    line += fmt::format("  {} sha256:{}", one_line(input.filename().string()), sha256_hex(read_file(input)));
   }
   return line + "\n";
 }

@@ -10,7 +10,8 @@
 
 namespace hexcal {
 
-/// Whole file as bytes. Throws InputError naming the file if it cannot be read.
+/// Whole file as bytes. Throws InputError naming the file if it cannot be read or holds more than 1 GiB,
+/// or than 64 MiB if it is no regular file (a device has no end).
 [[nodiscard]] std::string read_file(const std::filesystem::path& path);
 
 /// Whether a file must survive a power cut, or may be lost then because it can be made anew.
@@ -27,8 +28,15 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view c
 /// a full disk leaves every old file as it was.
 void write_files_atomically(const std::vector<std::pair<std::filesystem::path, std::string>>& files);
 
-/// Takes away what writers whose process is gone left behind in a folder.
-void remove_abandoned_files(const std::filesystem::path& folder);
+/// A results folder is hexcal's own: throws InputError if it, or a folder in it, is a link to somewhere else.
+/// (A file that is a link is no danger: it is replaced, not written through.)
+void refuse_linked_folders(const std::filesystem::path& results);
+
+/// Takes away what writers whose process is gone left behind in a folder, of all files or of one.
+void remove_abandoned_files(const std::filesystem::path& folder, std::string_view of_file = {});
+
+/// Text on one line: control characters, line breaks too, as \xNN.
+[[nodiscard]] std::string one_line(std::string_view text);
 
 /// First comment line of every output: "# hexcal VERSION  COMMAND  NAME sha256:HASH ...". Inputs that do not
 /// exist are left out; names are printed without their folders so that the line does not depend on where the

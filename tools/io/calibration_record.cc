@@ -8,6 +8,7 @@
 
 #include "kinematics/geometry/input_error.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/json_text.h"
 
 namespace hexcal {
 namespace {
@@ -193,7 +194,7 @@ std::string calibration_record_text(const std::string& key, const CalibrationRep
     out["dropped"].push_back({evaluation.method, evaluation.dropped});
   if (report.fitted.identified && report.identifiability)
     out["identified"] = identified_json(*report.fitted.identified, *report.identifiability);
-  return out.dump() + "\n";
+  return json_text(out) + "\n";
 }
 
 std::optional<CalibrationReport> read_calibration_record(const std::filesystem::path& path,

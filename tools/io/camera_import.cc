@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "camera_calib/fit_lens_model.h"
 #include "kinematics/geometry/input_error.h"
 #include "tools/io/atomic_file.h"
@@ -8,6 +10,9 @@
 
 namespace hexcal {
 namespace {
+
+constexpr int kSmallestEdgePx = 16;
+constexpr int kLargestEdgePx = 65535;
 
 CameraModel from_opencv_values(const YamlMap& map, int width, int height, const std::vector<double>& matrix,
                                const std::vector<double>& terms) {
@@ -26,6 +31,12 @@ CameraModel from_opencv_values(const YamlMap& map, int width, int height, const 
   return camera;
 }
 
+void check_edge(const YamlMap& map, const std::string& key, double edge) {
+  if (edge == std::floor(edge) && edge >= kSmallestEdgePx && edge <= kLargestEdgePx) return;
+  map.fail(key, fmt::format("found {}, wanted a whole number from {} to {}", edge, kSmallestEdgePx,
+                            kLargestEdgePx));
+}
+
 // OpenCV writes a header that is not YAML 1.2 and several files of samples use capitalised names.
 std::string without_opencv_header(std::string text) {
   if (text.starts_with("%YAML:1.0")) text = text.substr(text.find('\n') + 1);
@@ -36,6 +47,7 @@ ForeignCamera read_opencv(const YamlMap& map) {
   const auto key = [&map](const char* first, const char* second) { return map.has(first) ? first : second; };
   const YamlMap matrix = map.map(key("camera_matrix", "Camera_Matrix"));
   const YamlMap terms = map.map(key("distortion_coefficients", "Distortion_Coefficients"));
+  for (const char* edge : {"image_width", "image_height"}) check_edge(map, edge, map.number(edge));
   ForeignCamera out;
   out.camera.model = from_opencv_values(map, map.integer("image_width"), map.integer("image_height"),
                                         matrix.numbers("data", 9), terms.numbers("data"));
@@ -57,11 +69,12 @@ ForeignCamera read_photomodeler(const YamlMap& map) {
   values.finish();
   const std::vector<double> size = map.numbers("image_size_px", 2);
   map.finish();
+  if (!(focal > 0) || !(format[0] > 0) || !(format[1] > 0)) {
+    map.fail("photomodeler", "wanted positive focal_mm and format_mm");
+  }
+  for (const double edge : size) check_edge(map, "image_size_px", edge);
   const int width = static_cast<int>(size[0]);
   const int height = static_cast<int>(size[1]);
-  if (!(focal > 0) || !(format[0] > 0) || !(format[1] > 0) || width < 16 || height < 16) {
-    map.fail("photomodeler", "wanted positive focal_mm, format_mm and image_size_px");
-  }
   std::vector<RayPixel> rays;
   constexpr int kColumns = 40;
   constexpr int kRows = 30;
@@ -93,8 +106,9 @@ ForeignCamera read_foreign_camera(const std::filesystem::path& path) {
   const YamlMap map = YamlMap::parse(without_opencv_header(read_file(path)), path);
   ForeignCamera out = map.has("photomodeler") ? read_photomodeler(map) : read_opencv(map);
   CameraModel& camera = out.camera.model;
-  if (!(camera.fx_px() > 0) || !(camera.fy_px() > 0) || camera.width_px < 16 || camera.height_px < 16) {
-    throw InputError(fmt::format("{}: wanted a positive focal length and an image size", path.string()));
+  if (!(camera.fx_px() > 0) || !(camera.fy_px() > 0) || !camera.parameters.allFinite()) {
+    throw InputError(
+        fmt::format("{}: wanted a positive focal length and numbers of a camera", path.string()));
   }
   out.camera.setting.width_px = camera.width_px;
   out.camera.setting.height_px = camera.height_px;

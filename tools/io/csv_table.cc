@@ -13,6 +13,10 @@
 namespace hexcal {
 namespace {
 
+// Far beyond any table of ours; a file without commas or line breaks is something else.
+constexpr std::size_t kMaxColumns = 1000;
+constexpr std::size_t kMaxFieldBytes = std::size_t{1} << 20;
+
 std::string trimmed(std::string_view text) {
   const auto first = text.find_first_not_of(" \t");
   if (first == std::string_view::npos) return {};
@@ -20,7 +24,8 @@ std::string trimmed(std::string_view text) {
   return std::string(text.substr(first, last - first + 1));
 }
 
-// Takes one record off `text`, which may span lines inside quotes; counts the lines it took.
+// Takes one record off `text`, which may span lines inside quotes; counts the lines it took. Stops early at
+// a field or a number of fields that no table has.
 std::vector<std::string> take_record(std::string_view& text, int& lines) {
   std::vector<std::string> fields;
   std::string field;
@@ -33,7 +38,7 @@ std::vector<std::string> take_record(std::string_view& text, int& lines) {
     field.clear();
     was_quoted = false;
   };
-  for (; i < text.size(); ++i) {
+  for (; i < text.size() && field.size() <= kMaxFieldBytes && fields.size() < kMaxColumns; ++i) {
     const char c = text[i];
     if (quoted) {
       if (c == '"' && i + 1 < text.size() && text[i + 1] == '"') {
@@ -92,6 +97,11 @@ CsvTable CsvTable::parse(std::string_view text, const std::filesystem::path& pat
     }
     int lines = 1;
     Row row{line, take_record(text, lines)};
+    if (row.fields.size() > kMaxColumns || row.fields.back().size() > kMaxFieldBytes) {
+      throw InputError(
+          fmt::format("{}:{}: no CSV table: more than {} fields in a line, or one of more than {} bytes",
+                      path.string(), line, kMaxColumns, kMaxFieldBytes));
+    }
     line += lines;
     if (table.columns_.empty()) {
       table.columns_ = std::move(row.fields);

@@ -14,6 +14,7 @@
 #include <memory>
 
 #include "kinematics/geometry/input_error.h"
+#include "tools/io/atomic_file.h"
 
 namespace hexcal {
 namespace {
@@ -165,7 +166,8 @@ class PendingFile {
     fs::create_directories(folder, error);
     if (fs::is_directory(target_, error))
       throw InputError(fmt::format("{}: is a folder, wanted a file name to write", target_.string()));
-    path_ = folder / fmt::format(".{}.{}.tmp", target_.filename().string(), ::getpid());
+    remove_abandoned_files(folder, target_.filename().string());
+    path_ = folder / fmt::format(".{}.{}.0.tmp", target_.filename().string(), ::getpid());
     descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
     if (descriptor_ < 0) fail();
   }
@@ -225,8 +227,8 @@ StreamTally stream_rows(const fs::path& input, const fs::path& output, const std
   std::ifstream in(input, std::ios::binary);
   if (!in) throw InputError(fmt::format("{}: cannot read: {}", input.string(), std::strerror(errno)));
   PendingFile out(output);
-  out.write(fmt::format("{}  {} sha256:{}\n{}", head, input.filename().string(), hash_of_file(input),
-                        transform.header));
+  out.write(fmt::format("{}  {} sha256:{}\n{}", head, one_line(input.filename().string()),
+                        hash_of_file(input), transform.header));
 
   std::size_t line = 1;
   std::string name;

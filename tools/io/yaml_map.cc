@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <unordered_map>
 
 #include "kinematics/geometry/input_error.h"
 #include "kinematics/geometry/pose.h"
@@ -15,9 +16,23 @@
 namespace hexcal {
 
 struct YamlMap::State {
+  State(std::filesystem::path file, std::string dotted, const YAML::Node& mapping)
+      : path(std::move(file)), prefix(std::move(dotted)), node(mapping) {
+    for (const auto& entry : node) {  // of a key that stands twice, the first
+      if (entry.first.IsScalar()) entries.emplace(entry.first.Scalar(), entry.second);
+    }
+  }
+
+  // Undefined if there is none.
+  [[nodiscard]] YAML::Node find(const std::string& key) const {
+    const auto found = entries.find(key);
+    return found == entries.end() ? YAML::Node(YAML::NodeType::Undefined) : found->second;
+  }
+
   std::filesystem::path path;
   std::string prefix;  // dotted name of this mapping, with a trailing dot
   YAML::Node node;
+  std::unordered_map<std::string, YAML::Node> entries;
   std::set<std::string> asked;
 };
 
@@ -43,7 +58,11 @@ std::string place(const std::filesystem::path& path, const YAML::Node& node) {
 }
 
 std::string shown(const YAML::Node& node) {
-  if (node.IsScalar()) return fmt::format("'{}'", node.Scalar());
+  constexpr std::size_t kShown = 60;
+  if (node.IsScalar()) {
+    const std::string& text = node.Scalar();
+    return fmt::format("'{}'{}", text.substr(0, kShown), text.size() > kShown ? " ..." : "");
+  }
   if (node.IsSequence()) return fmt::format("a list of {}", node.size());
   if (node.IsMap()) return "a mapping";
   return "nothing";
@@ -81,53 +100,44 @@ YamlMap YamlMap::parse(const std::string& text, const std::filesystem::path& pat
     throw InputError(
         fmt::format("{}: {} bytes, wanted at most {}", path.string(), text.size(), kMaxYamlBytes));
   }
-  auto state = std::make_shared<State>();
-  state->path = path;
+  YAML::Node node;
   try {
-    state->node = YAML::Load(text);
+    node = YAML::Load(text);
   } catch (const YAML::Exception& error) {
     throw InputError(fmt::format("{}:{}: not valid YAML: {}", path.string(), error.mark.line + 1, error.msg));
   }
   std::size_t nodes = 0;
-  if (!is_bounded(state->node, 0, nodes)) {
+  if (!is_bounded(node, 0, nodes)) {
     throw InputError(
         fmt::format("{}: nested more than {} deep or longer than {} entries (an alias to itself?)",
                     path.string(), kMaxYamlDepth, kMaxYamlNodes));
   }
-  if (!state->node.IsMap()) {
-    throw InputError(fmt::format("{}: found {}, wanted keys and values", path.string(), shown(state->node)));
+  if (!node.IsMap()) {
+    throw InputError(fmt::format("{}: found {}, wanted keys and values", path.string(), shown(node)));
   }
-  return YamlMap(state);
+  return YamlMap(std::make_shared<State>(path, "", node));
 }
 
 YamlMap YamlMap::read(const std::filesystem::path& path) { return parse(read_file(path), path); }
 
 const std::filesystem::path& YamlMap::path() const { return state_->path; }
 
-namespace {
-YAML::Node find(const YAML::Node& node, const std::string& key) {
-  for (const auto& entry : node) {
-    if (entry.first.IsScalar() && entry.first.Scalar() == key) return entry.second;
-  }
-  return YAML::Node(YAML::NodeType::Undefined);
-}
-}  // namespace
-
 bool YamlMap::has(const std::string& key) const {
   state_->asked.insert(key);
-  const YAML::Node node = find(state_->node, key);
+  const YAML::Node node = state_->find(key);
   return node.IsDefined() && !node.IsNull();
 }
 
 void YamlMap::fail(const std::string& key, const std::string& message) const {
-  const YAML::Node node = find(state_->node, key);
+  const YAML::Node node = state_->find(key);
   const std::string where = place(state_->path, node.IsDefined() ? node : state_->node);
   throw InputError(fmt::format("{}: {}{}: {}", where, state_->prefix, key, message));
 }
 
 namespace {
-YAML::Node require(const YamlMap& map, const YAML::Node& node, const std::string& key, const char* wanted) {
-  if (map.has(key)) return find(node, key);
+YAML::Node require(const YamlMap& map, const YAML::Node& node, const YAML::Node& value,
+                   const std::string& key, const char* wanted) {
+  if (map.has(key)) return value;
   std::string message = fmt::format("missing, wanted {}", wanted);
   for (const auto& entry : node) {  // most often it is there, misspelt
     const std::string other = entry.first.IsScalar() ? entry.first.Scalar() : std::string();
@@ -139,7 +149,7 @@ YAML::Node require(const YamlMap& map, const YAML::Node& node, const std::string
 }  // namespace
 
 double YamlMap::number(const std::string& key) const {
-  const YAML::Node node = require(*this, state_->node, key, "a number");
+  const YAML::Node node = require(*this, state_->node, state_->find(key), key, "a number");
   const auto value = node.IsScalar() ? parse_number(node.Scalar()) : std::nullopt;
   if (!value) fail(key, fmt::format("found {}, wanted a number", shown(node)));
   return *value;
@@ -152,14 +162,14 @@ double YamlMap::number_or(const std::string& key, double fallback) const {
 int YamlMap::integer(const std::string& key) const {
   const double value = number(key);
   if (value != std::floor(value) || std::abs(value) > 2e9) {
-    fail(key, fmt::format("found {}, wanted a whole number", shown(find(state_->node, key))));
+    fail(key, fmt::format("found {}, wanted a whole number", shown(state_->find(key))));
   }
   return static_cast<int>(value);
 }
 
 bool YamlMap::boolean_or(const std::string& key, bool fallback) const {
   if (!has(key)) return fallback;
-  const YAML::Node node = find(state_->node, key);
+  const YAML::Node node = state_->find(key);
   bool value = false;
   if (!node.IsScalar() || !YAML::convert<bool>::decode(node, value)) {
     fail(key, fmt::format("found {}, wanted true or false", shown(node)));
@@ -168,7 +178,7 @@ bool YamlMap::boolean_or(const std::string& key, bool fallback) const {
 }
 
 std::string YamlMap::text(const std::string& key) const {
-  const YAML::Node node = require(*this, state_->node, key, "a text");
+  const YAML::Node node = require(*this, state_->node, state_->find(key), key, "a text");
   if (!node.IsScalar()) fail(key, fmt::format("found {}, wanted a text", shown(node)));
   return node.Scalar();
 }
@@ -187,7 +197,7 @@ std::string YamlMap::choice(const std::string& key, const std::vector<std::strin
 }
 
 std::vector<double> YamlMap::numbers(const std::string& key, std::size_t size) const {
-  const YAML::Node node = require(*this, state_->node, key, "a list of numbers");
+  const YAML::Node node = require(*this, state_->node, state_->find(key), key, "a list of numbers");
   if (!node.IsSequence() || (size != 0 && node.size() != size)) {
     fail(key, fmt::format("found {}, wanted a list of {}numbers", shown(node),
                           size != 0 ? fmt::format("{} ", size) : std::string()));
@@ -212,7 +222,7 @@ Eigen::Vector3d YamlMap::vector3(const std::string& key) const {
 }
 
 std::vector<Eigen::Vector3d> YamlMap::vectors3(const std::string& key, std::size_t size) const {
-  const YAML::Node node = require(*this, state_->node, key, "a list of [x, y, z]");
+  const YAML::Node node = require(*this, state_->node, state_->find(key), key, "a list of [x, y, z]");
   if (!node.IsSequence() || (size != 0 && node.size() != size)) {
     fail(key, fmt::format("found {}, wanted a list of {}[x, y, z]", shown(node),
                           size != 0 ? fmt::format("{} ", size) : std::string()));
@@ -233,7 +243,7 @@ std::vector<Eigen::Vector3d> YamlMap::vectors3(const std::string& key, std::size
 }
 
 std::vector<std::string> YamlMap::texts(const std::string& key) const {
-  const YAML::Node node = require(*this, state_->node, key, "a list");
+  const YAML::Node node = require(*this, state_->node, state_->find(key), key, "a list");
   if (!node.IsSequence()) fail(key, fmt::format("found {}, wanted a list", shown(node)));
   std::vector<std::string> values;
   for (const auto& entry : node) {
@@ -252,26 +262,19 @@ Rigid3 YamlMap::rigid3(const std::string& key) const {
 }
 
 YamlMap YamlMap::map(const std::string& key) const {
-  const YAML::Node node = require(*this, state_->node, key, "keys and values");
+  const YAML::Node node = require(*this, state_->node, state_->find(key), key, "keys and values");
   if (!node.IsMap()) fail(key, fmt::format("found {}, wanted keys and values", shown(node)));
-  auto state = std::make_shared<State>();
-  state->path = state_->path;
-  state->prefix = state_->prefix + key + ".";
-  state->node = node;
-  return YamlMap(state);
+  return YamlMap(std::make_shared<State>(state_->path, state_->prefix + key + ".", node));
 }
 
 std::vector<YamlMap> YamlMap::maps(const std::string& key) const {
-  const YAML::Node node = require(*this, state_->node, key, "a list");
+  const YAML::Node node = require(*this, state_->node, state_->find(key), key, "a list");
   if (!node.IsSequence()) fail(key, fmt::format("found {}, wanted a list", shown(node)));
   std::vector<YamlMap> all;
   for (std::size_t i = 0; i < node.size(); ++i) {
     if (!node[i].IsMap()) fail(key, fmt::format("found {}, wanted keys and values", shown(node[i])));
-    auto state = std::make_shared<State>();
-    state->path = state_->path;
-    state->prefix = fmt::format("{}{}[{}].", state_->prefix, key, i);
-    state->node = node[i];
-    all.push_back(YamlMap(state));
+    all.push_back(YamlMap(
+        std::make_shared<State>(state_->path, fmt::format("{}{}[{}].", state_->prefix, key, i), node[i])));
   }
   return all;
 }
@@ -288,10 +291,8 @@ std::vector<std::string> YamlMap::keys() const {
   return all;
 }
 
-bool YamlMap::is_map(const std::string& key) const { return has(key) && find(state_->node, key).IsMap(); }
-bool YamlMap::is_sequence(const std::string& key) const {
-  return has(key) && find(state_->node, key).IsSequence();
-}
+bool YamlMap::is_map(const std::string& key) const { return has(key) && state_->find(key).IsMap(); }
+bool YamlMap::is_sequence(const std::string& key) const { return has(key) && state_->find(key).IsSequence(); }
 
 void YamlMap::finish() const {
   std::set<std::string> seen;

@@ -132,8 +132,8 @@ Html html_scene(const Scene3d& scene) {
              : fmt::format("; vermilion: one-sigma error ellipsoids, {} times enlarged.",
                            significant_text(scene.ellipsoid_scale, 1));
   out += html_element("p", html_text(key), {{"class", "scene-key"}});
-  out += Html{"<script type=\"application/json\" id=\"scene-data\">" + script_escaped(data.dump()) +
-              "</script>\n"};
+  out += Html{"<script type=\"application/json\" id=\"scene-data\">" +
+              script_escaped(data.dump(-1, ' ', false, Json::error_handler_t::replace)) + "</script>\n"};
   return out;
 }
 
