@@ -25,8 +25,7 @@ std::optional<double> capture_seconds(const std::string& text) {
       6) {
     return std::nullopt;
   }
-  const std::chrono::year_month_day day_of_year(std::chrono::year(year), std::chrono::month(month),
-                                                std::chrono::day(day));
+  const auto day_of_year = std::chrono::year(year) / std::chrono::month(month) / std::chrono::day(day);
   const bool time_ok = hour >= 0 && hour < 24 && minute >= 0 && minute < 60 && second >= 0 && second < 61;
   if (year < 1900 || year > 9999 || month > 12 || day > 31 || !day_of_year.ok() || !time_ok)
     return std::nullopt;

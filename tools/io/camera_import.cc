@@ -92,7 +92,11 @@ ForeignCamera read_photomodeler(const YamlMap& map) {
     }
   }
   const LensModelFit fit = fit_lens_model(rays, width, height, LensModel::brown);
-  if (!fit.converged) map.fail("photomodeler", "no camera has these values");
+  constexpr double kLargestRmsPx = 1;
+  if (!fit.converged || !(fit.rms_px < kLargestRmsPx)) {
+    map.fail("photomodeler",
+             fmt::format("no Brown camera has these values (the best differs by {:.3g} px rms)", fit.rms_px));
+  }
   ForeignCamera out;
   out.camera.model = fit.camera;
   out.format = "photomodeler";

@@ -75,9 +75,12 @@ PlatformGeometry parse_linuxcnc(const std::string& text, const PlatformGeometry&
         continue;
       }
       // genhexkins.GROUP.N.AXIS
-      const auto group_end = pin.find('.', 11);
-      const std::string group = pin.substr(11, group_end - 11);
-      const auto leg = static_cast<std::size_t>(pin.at(group_end + 1) - '0');
+      constexpr std::string_view kComponent = "genhexkins.";
+      const std::size_t group_end = pin.find('.', kComponent.size());
+      if (!pin.starts_with(kComponent) || group_end == std::string::npos || pin.size() != group_end + 4)
+        throw InputError(fmt::format("'{}': no such pin", line));
+      const std::string group = pin.substr(kComponent.size(), group_end - kComponent.size());
+      const auto leg = static_cast<std::size_t>(pin[group_end + 1] - '0');
       const auto axis = static_cast<Eigen::Index>(pin.back() - 'x');
       if (leg > 5 || axis < 0 || axis > 2) throw InputError(fmt::format("'{}': no such pin", line));
       if (group == "base") geometry.base_joints_mm[leg][axis] = value;
@@ -91,7 +94,9 @@ PlatformGeometry parse_linuxcnc(const std::string& text, const PlatformGeometry&
     std::string ini, key, equals;
     double value = 0;
     if (first != "#" || !(words >> ini) || ini != "ini" || !(words >> key)) continue;
-    if (key.rfind("[JOINT_", 0) == 0) joint = static_cast<std::size_t>(key.at(7) - '0');
+    constexpr std::string_view kJoint = "[JOINT_";
+    if (key.starts_with(kJoint) && key.size() > kJoint.size())
+      joint = static_cast<std::size_t>(key[kJoint.size()] - '0');
     if (!(words >> equals >> value) || joint > 5) continue;
     if (key == "SCALE") geometry.actuators[joint].mm_per_unit = 1.0 / value;
     if (key == "HOME_OFFSET") geometry.actuators[joint].offset_mm = value;

@@ -40,7 +40,7 @@ namespace {
 
 constexpr std::size_t kMaxYamlBytes = 16 << 20;
 constexpr int kMaxYamlDepth = 32;
-constexpr std::size_t kMaxYamlNodes = 1'000'000;
+constexpr std::size_t kMaxYamlNodes = 300'000;
 
 // An alias may stand inside its own anchor, or multiply a small file into a huge tree.
 bool is_bounded(const YAML::Node& node, int depth, std::size_t& nodes) {
