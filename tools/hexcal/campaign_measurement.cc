@@ -80,6 +80,17 @@ fs::path cache_file(const OpenCampaign& open, const std::string& photograph_sha2
   return open.results / "cache" / (sha256_hex(key) + ".txt");
 }
 
+// Empty where there is nothing to read; read_photograph will say why.
+std::string hash_of_photograph(const fs::path& path) {
+  std::error_code error;
+  if (fs::file_size(path, error) == 0 || error) return {};
+  try {
+    return sha256_hex(read_file(path));
+  } catch (const InputError&) {  // no right to read it, or it is gone since
+    return {};
+  }
+}
+
 std::optional<PhotographObservations> cached(const fs::path& file) {
   if (!fs::exists(file)) return std::nullopt;
   try {
@@ -155,6 +166,7 @@ std::set<fs::path>& held_folders() {
 CampaignLock::CampaignLock(const fs::path& results) {
   std::error_code error;
   fs::create_directories(results, error);
+  if (error) throw InputError(fmt::format("{}: cannot create: {}", results.string(), error.message()));
   const fs::path path = results / ".lock";
   folder_ = fs::weakly_canonical(results, error);
   if (held_folders().count(folder_) != 0) return;
@@ -181,10 +193,8 @@ CampaignLock::~CampaignLock() {
 PhotographObservations observe_image(const OpenCampaign& open, std::size_t image, bool use_cache) {
   const CampaignImage& entry = open.listing.images[image];
   const int camera = open.camera_of_image[image];
-  std::string sha;
-  std::error_code error;
-  if (use_cache && camera >= 0 && fs::file_size(entry.path, error) > 0 && !error) {
-    sha = sha256_hex(read_file(entry.path));
+  const std::string sha = use_cache && camera >= 0 ? hash_of_photograph(entry.path) : std::string();
+  if (!sha.empty()) {
     if (auto found = cached(cache_file(open, sha, camera))) {
       found->name = entry.name;
       return *found;
