@@ -72,6 +72,7 @@ Colour colour_of(Light light) {
 }
 
 int write_report(const ReportFlags& flags) {
+  refuse_linked_folders(campaign_folder(flags.campaign) / "results");
   const PreparedPage page = prepare_page(flags);
   const char* name = flags.before.empty() ? "report.html" : "comparison.html";
   const fs::path out = flags.out.empty() ? campaign_folder(flags.campaign) / "results" / name : flags.out;

@@ -108,9 +108,9 @@ void keep_measurement(const MeasureRequest& request, const OpenCampaign& open,
   std::vector<FileHash> photographs;
   for (std::size_t i = 0; i < open.listing.images.size(); ++i) {
     // What was decoded counts, not what may have taken its place since.
-    const std::string& seen = observations.photographs[i].seen.sha256;
-    const fs::path& path = open.listing.images[i].path;
-    photographs.emplace_back(path.string(), seen.empty() ? hash_of(path) : seen);
+    const PhotographObservations& seen = observations.photographs[i].seen;
+    const bool was_empty = seen.status == PhotographStatus::empty;
+    photographs.emplace_back(open.listing.images[i].path.string(), was_empty ? sha256_hex("") : seen.sha256);
   }
   const nlohmann::ordered_json record{{"circumstances", circumstances(request, open)},
                                       {"read", hashes_of(files_read(request, open))},

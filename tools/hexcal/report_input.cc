@@ -34,7 +34,6 @@ std::string maker_of(const fs::path& result) {
 void add_compensation(const Campaign& campaign, const std::string& method, CampaignReport& report,
                       std::vector<fs::path>& inputs) {
   const fs::path results = campaign.folder / "results";
-  refuse_linked_folders(results);
   if (!campaign.hexapod) {
     report.no_compensation =
         "Name the `hexapod` in campaign.yaml and run `hexcal compensate`: nothing is known of the machine "
