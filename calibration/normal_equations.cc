@@ -153,8 +153,7 @@ NormalEquations normal_equations(const std::vector<ReducedPose>& reduced, const 
     }
   }
   if (joint) {
-    const auto n = static_cast<Eigen::Index>(6 * reduced.size());
-    Eigen::MatrixXd by_pose = Eigen::MatrixXd::Zero(rows, n);
+    std::vector<Eigen::Index> starts;
     Eigen::VectorXd residuals(rows);
     Eigen::MatrixXd jacobian(rows, parameters);
     Eigen::Index at = 0;
@@ -163,13 +162,23 @@ NormalEquations normal_equations(const std::vector<ReducedPose>& reduced, const 
       const ReducedPose& pose = reduced[i];
       const Eigen::Index m = pose.residuals.size();
       const double root = std::sqrt(weights[i]);
-      by_pose.block(at, 6 * static_cast<Eigen::Index>(i), m, 6) = pose.by_pose;
+      starts.push_back(at);
       residuals.segment(at, m) = root * pose.residuals;
       jacobian.middleRows(at, m) = root * pose.jacobian;
       mean_weight += weights[i] / static_cast<double>(reduced.size());
       at += m;
     }
-    Eigen::MatrixXd covariance = by_pose * observations.joint_covariance * by_pose.transpose();
+    // A pose's legs depend on that pose only: block by block, of which the lower triangle is enough.
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(rows, rows);
+    for (std::size_t i = 0; i < reduced.size(); ++i) {
+      for (std::size_t j = 0; j <= i; ++j) {
+        const Matrix6d block = observations.joint_covariance.block<6, 6>(6 * static_cast<Eigen::Index>(i),
+                                                                         6 * static_cast<Eigen::Index>(j));
+        const SmallMatrix through = reduced[i].by_pose * block;
+        covariance.block(starts[i], starts[j], through.rows(), reduced[j].by_pose.rows()) =
+            through.lazyProduct(reduced[j].by_pose.transpose());
+      }
+    }
     covariance.diagonal().array() += leg_variance(noise);
     const Eigen::LLT<Eigen::MatrixXd> llt(covariance);
     llt.matrixL().solveInPlace(residuals);
