@@ -100,7 +100,7 @@ class WithoutRights : public HostileFolders {
   // Runs `before; hexcal measure & after; wait`.
   [[nodiscard]] int measure(const std::string& after = "") const {
     const std::string line = "cd / && " + as_nobody_ + HEXCAL_BINARY " measure '" + lab_.folder().string() +
-                             "' >/dev/null 2>'" + err_.string() + "' & " + after + " wait $!";
+                             "' >'" + err_.string() + "' 2>&1 & " + after + " wait $!";
     return WEXITSTATUS(std::system(line.c_str()));
   }
 

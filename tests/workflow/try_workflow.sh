@@ -23,6 +23,6 @@ cd "$work/photographs"
 "$hexcal" measure lab >/dev/null
 
 cmp "$work/parts/lab/workflow/observations.txt" "$work/single/observations.txt"
-diff -r "$work/parts/lab/results" "$work/single/lab/results"
+diff -r --exclude=cache "$work/parts/lab/results" "$work/single/lab/results"
 diff <(grep -v '^#' "$work/parts/lab/results/poses.csv") <(grep -v '^#' "$work/photographs/lab/results/poses.csv")
 echo "$(grep -c 'rule detect' "$work/log") detect jobs: same bytes as the single run"
