@@ -90,6 +90,10 @@ class WithoutRights : public HostileFolders {
       if (std::system(trial.c_str()) != 0) GTEST_SKIP() << "cannot run as nobody";
       fs::permissions(lab_.folder().parent_path(), fs::perms(0755));
       allow(fs::perms(0777));
+      // Photographs are links that other tests may have left to root alone.
+      for (const auto& entry : fs::recursive_directory_iterator(lab_.poses())) {
+        if (entry.is_regular_file()) fs::permissions(entry.path(), fs::perms(0644));
+      }
     }
   }
   void TearDown() override { allow(fs::perms(0777)); }
@@ -97,7 +101,7 @@ class WithoutRights : public HostileFolders {
     fs::permissions(results_, perms);
     if (fs::exists(results_ / "cache")) fs::permissions(results_ / "cache", perms);
   }
-  // Runs `before; hexcal measure & after; wait`.
+  // Runs `hexcal measure & after; wait`.
   [[nodiscard]] int measure(const std::string& after = "") const {
     const std::string line = "cd / && " + as_nobody_ + HEXCAL_BINARY " measure '" + lab_.folder().string() +
                              "' >'" + err_.string() + "' 2>&1 & " + after + " wait $!";
