@@ -81,13 +81,22 @@ BundleLayout without_columns(const BundleLayout& full) {
   return layout;
 }
 
+// What is held needs no columns until the solution is analysed.
+BundleSolution solution_from(const AdjustmentJob& job, const AdjustmentStage& stage,
+                             const BundleSettings& settings, double robust_limit, int max_iterations) {
+  return solve_bundle_adjustment(job.network, stage.geometry, stage.sightings,
+                                 settings.common_moves ? stage.layout : without_columns(stage.layout),
+                                 settings, robust_limit, max_iterations);
+}
+
+// Sums of squares of the sightings where the stage stands.
+std::vector<double> present_squares(const AdjustmentJob& job, const AdjustmentStage& stage) {
+  return solution_from(job, stage, stage.settings, 0, 0).squares;
+}
+
 void solve(const AdjustmentJob& job, AdjustmentStage& stage, double robust_limit,
            const BundleSettings& settings) {
-  // What is held needs no columns until the solution is analysed.
-  BundleSolution solution =
-      solve_bundle_adjustment(job.network, stage.geometry, stage.sightings,
-                              stage.settings.common_moves ? stage.layout : without_columns(stage.layout),
-                              settings, robust_limit, kMaxIterations);
+  BundleSolution solution = solution_from(job, stage, settings, robust_limit, kMaxIterations);
   if (!stage.settings.common_moves) solution.system.reset();
   stage.geometry = std::move(solution.geometry);
   stage.converged = solution.converged;
@@ -163,12 +172,8 @@ std::vector<SightingTest> test_stage(const AdjustmentJob& job, const AdjustmentS
 double solve_robustly(const AdjustmentJob& job, AdjustmentStage& stage) {
   double limit2 = 0;
   for (int round = 0; round < kRobustRounds; ++round) {
-    const BundleSolution at = solve_bundle_adjustment(job.network, stage.geometry, stage.sightings,
-                                                      stage.layout, stage.settings, 0, 0);
-    std::vector<double> squares;
-    for (const double q : at.squares) {
-      if (q >= 0) squares.push_back(q);
-    }
+    std::vector<double> squares = present_squares(job, stage);
+    std::erase_if(squares, [](double q) { return q < 0; });
     const double next = kRobustWidth * kRobustWidth * 8 * std::max(1.0, median(squares) / kMedianChi2Of8);
     if (round > 0 && next > 0.5 * limit2) break;
     limit2 = next;
@@ -196,10 +201,9 @@ void drop_unsupported(const AdjustmentJob& job, AdjustmentStage& stage) {
 }
 
 void reject_outliers(const AdjustmentJob& job, AdjustmentStage& stage, double robust_limit2) {
-  const BundleSolution at = solve_bundle_adjustment(job.network, stage.geometry, stage.sightings,
-                                                    stage.layout, stage.settings, 0, 0);
+  const std::vector<double> squares = present_squares(job, stage);
   for (std::size_t s = 0; s < stage.sightings.size(); ++s) {
-    if (at.squares[s] > robust_limit2) stage.sightings[s].status = SightingStatus::outlier;
+    if (squares[s] > robust_limit2) stage.sightings[s].status = SightingStatus::outlier;
   }
   const double base8 = chi2_quantile(8, job.options.outlier_probability);
   const double base6 = chi2_quantile(6, job.options.outlier_probability);

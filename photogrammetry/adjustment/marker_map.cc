@@ -43,7 +43,6 @@ AdjustmentStage start_on_map(const Network& alone, const EpochMembers& members,
   stage.layout = map.layout;
   stage.covariance = map.common_covariance;
   stage.settings.data_variance = map.sigma0 * map.sigma0;
-  stage.settings.interior_inflation.assign(alone.cameras.size(), 1.0);
   stage.settings.common_moves = false;
   stage.settings.converged = 1e-6;  // a thousandth of a standard deviation
   return stage;

@@ -28,6 +28,8 @@ void campaign(const std::string& text) {
   }
 }
 
+void images(const std::string& text) { (void)read_images_table(memory_folder().put("images.csv", text)); }
+
 void hexapod(const std::string& text) {
   const PlatformGeometry geometry = parse_hexapod(text, "fuzz.yaml");
   promise(!geometry_fault(geometry), "a geometry that was accepted has no fault");
@@ -62,25 +64,8 @@ void model(const std::string& text) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace hexcal::fuzzing;
-  if (size == 0) return 0;
-  const std::string text(reinterpret_cast<const char*>(data) + 1, size - 1);
-  refused_or([&] {
-    switch (data[0]) {
-      case 'c':
-        return campaign(text);
-      case 'i':
-        return (void)hexcal::read_images_table(memory_folder().put("images.csv", text));
-      case 'h':
-        return hexapod(text);
-      case 'k':
-        return camera(text);
-      case 's':
-        return sheet(text);
-      case 'm':
-        return model(text);
-      default:
-        return;
-    }
-  });
+  static const std::map<char, void (*)(const std::string&)> readers{
+      {'c', campaign}, {'i', images}, {'h', hexapod}, {'k', camera}, {'s', sheet}, {'m', model}};
+  read_by_first_byte(data, size, readers);
   return 0;
 }

@@ -3,10 +3,12 @@
 #include <unistd.h>
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,6 +25,15 @@ void refused_or(const Read& read) {
     read();
   } catch (const InputError&) {
   }
+}
+
+/// Gives the input to the reader that its first byte names; to none if there is no such reader.
+inline void read_by_first_byte(const std::uint8_t* data, std::size_t size,
+                               const std::map<char, void (*)(const std::string&)>& readers) {
+  if (size == 0) return;
+  const auto reader = readers.find(static_cast<char>(data[0]));
+  if (reader == readers.end()) return;
+  refused_or([&] { reader->second({reinterpret_cast<const char*>(data) + 1, size - 1}); });
 }
 
 /// Stops the program, naming what was promised and not kept.

@@ -72,6 +72,16 @@ void network(const std::string& text) {
   }
 }
 
+void residuals(const std::string& text) { (void)read_residuals(memory_folder().put("residuals.csv", text)); }
+
+void record(const std::string& text) {
+  (void)read_calibration_record(memory_folder().put("calibration.json", text), "fuzz");
+}
+
+void gcs(const std::string& text) { (void)parse_pi_gcs(text); }
+
+void linuxcnc(const std::string& text) { (void)parse_linuxcnc(text, surrogate_hexapod()); }
+
 void stream(const std::string& text) {
   RowTransform copy;
   copy.columns = {"a", "b"};
@@ -93,33 +103,9 @@ void stream(const std::string& text) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace hexcal::fuzzing;
-  if (size == 0) return 0;
-  const std::string text(reinterpret_cast<const char*>(data) + 1, size - 1);
-  refused_or([&] {
-    switch (data[0]) {
-      case 'o':
-        return observations(text);
-      case 'p':
-        return poses(text);
-      case 'l':
-        return legs(text);
-      case 't':
-        return joined(text);
-      case 'n':
-        return network(text);
-      case 'r':
-        return (void)hexcal::read_residuals(memory_folder().put("residuals.csv", text));
-      case 'j':
-        return (void)hexcal::read_calibration_record(memory_folder().put("calibration.json", text), "fuzz");
-      case 'g':
-        return (void)hexcal::parse_pi_gcs(text);
-      case 'x':
-        return (void)hexcal::parse_linuxcnc(text, hexcal::surrogate_hexapod());
-      case 's':
-        return stream(text);
-      default:
-        return;
-    }
-  });
+  static const std::map<char, void (*)(const std::string&)> readers{
+      {'o', observations}, {'p', poses},  {'l', legs}, {'t', joined},   {'n', network},
+      {'r', residuals},    {'j', record}, {'g', gcs},  {'x', linuxcnc}, {'s', stream}};
+  read_by_first_byte(data, size, readers);
   return 0;
 }

@@ -87,14 +87,17 @@ double mean_normalised_square(const ObservationScene& scene, const AdjustmentRes
   return sum / count;
 }
 
-TEST(Adjustment, NoiseFreeSceneIsRecoveredExactly) {
-  const ObservationScene scene = make_observation_scene({});
-  const AdjustmentResult result = adjust_network(scene.network, {});
+void expect_exact(const ObservationScene& scene, const AdjustmentResult& result) {
   ASSERT_EQ(result.status, AdjustmentStatus::ok) << result.reason;
   const PoseErrors errors = pose_errors(scene, result);
   EXPECT_LT(errors.rms_um, 1e-4);
   EXPECT_LT(errors.rms_mdeg, 1e-4);
   EXPECT_LT(result.rms_px, 1e-7);
+}
+
+TEST(Adjustment, NoiseFreeSceneIsRecoveredExactly) {
+  const ObservationScene scene = make_observation_scene({});
+  expect_exact(scene, adjust_network(scene.network, {}));
 }
 
 TEST(Adjustment, NoiseOfOneHundredthPixelStaysWithinTheBudget) {
@@ -327,12 +330,7 @@ std::vector<int> first_epochs(int count) {
 
 TEST(MarkerMap, NoiseFreeSceneIsRecoveredExactly) {
   const ObservationScene scene = make_observation_scene({});
-  const AdjustmentResult result = adjust_network_by_map(scene.network, first_epochs(4), {});
-  ASSERT_EQ(result.status, AdjustmentStatus::ok) << result.reason;
-  const PoseErrors errors = pose_errors(scene, result);
-  EXPECT_LT(errors.rms_um, 1e-4);
-  EXPECT_LT(errors.rms_mdeg, 1e-4);
-  EXPECT_LT(result.rms_px, 1e-7);
+  expect_exact(scene, adjust_network_by_map(scene.network, first_epochs(4), {}));
 }
 
 TEST(MarkerMap, EpochsOnTheMapStateHonestSigmasAndLoseLittle) {

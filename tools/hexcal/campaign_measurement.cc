@@ -80,17 +80,6 @@ fs::path cache_file(const OpenCampaign& open, const std::string& photograph_sha2
   return open.results / "cache" / (sha256_hex(key) + ".txt");
 }
 
-// Empty where there is nothing to read; read_photograph will say why.
-std::string hash_of_photograph(const fs::path& path) {
-  std::error_code error;
-  if (fs::file_size(path, error) == 0 || error) return {};
-  try {
-    return sha256_hex(read_file(path));
-  } catch (const InputError&) {  // no right to read it, or it is gone since
-    return {};
-  }
-}
-
 std::optional<PhotographObservations> cached(const fs::path& file) {
   if (!fs::exists(file)) return std::nullopt;
   try {
@@ -190,10 +179,20 @@ CampaignLock::~CampaignLock() {
   ::close(file_);
 }
 
+std::string hash_if_readable(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return {};
+  try {
+    return sha256_hex(read_file(path));
+  } catch (const InputError&) {  // no right to read it, or it is gone since
+    return {};
+  }
+}
+
 PhotographObservations observe_image(const OpenCampaign& open, std::size_t image, bool use_cache) {
   const CampaignImage& entry = open.listing.images[image];
   const int camera = open.camera_of_image[image];
-  const std::string sha = use_cache && camera >= 0 ? hash_of_photograph(entry.path) : std::string();
+  const std::string sha = use_cache && camera >= 0 ? hash_if_readable(entry.path) : std::string();
   if (!sha.empty()) {
     if (auto found = cached(cache_file(open, sha, camera))) {
       found->name = entry.name;

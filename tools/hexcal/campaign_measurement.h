@@ -67,6 +67,9 @@ class CampaignLock {
 
 [[nodiscard]] ExtractOptions extract_options(const MeasureRequest& request);
 
+/// SHA-256 of a file's content; empty if it cannot be read (whoever needs the content says why).
+[[nodiscard]] std::string hash_if_readable(const std::filesystem::path& path);
+
 /// One photograph, through the cache.
 [[nodiscard]] PhotographObservations observe_image(const OpenCampaign& open, std::size_t image,
                                                    bool use_cache);

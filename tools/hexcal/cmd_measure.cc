@@ -11,6 +11,7 @@
 #include "tools/hexcal/measurement_record.h"
 #include "tools/hexcal/photograph_heads.h"
 #include "tools/hexcal/terminal.h"
+#include "tools/io/atomic_file.h"
 #include "tools/io/json_text.h"
 
 namespace hexcal {
@@ -110,7 +111,6 @@ MeasurementAnswer measure_anew(const MeasureRequest& request, OpenCampaign& open
   MeasurementAnswer answer;
   answer.written = write_results(request, open, observations, result);
   answer.text = measurement_text(observations, result, open.listing);
-  answer.json = measurement_json(observations, result, open.listing);
   answer.exit_code = measurement_exit_code(result);
   keep_measurement(request, open, observations, answer);
   return answer;
@@ -129,7 +129,7 @@ int measure(MeasureFlags flags) {
   std::optional<MeasurementAnswer> answer = unchanged_measurement(request, open);
   if (!answer) answer = measure_anew(request, open);
   if (flags.json) {
-    fmt::print("{}", answer->json);
+    fmt::print("{}", read_file(open.results / "quality.json"));
   } else {
     fmt::print("{}", answer->text);
     fmt::print("{}", written_line(answer->written));

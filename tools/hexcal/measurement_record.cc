@@ -10,6 +10,7 @@
 #include "kinematics/geometry/input_error.h"
 #include "photogrammetry/photograph/sha256.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/json_text.h"
 
 namespace hexcal {
 namespace fs = std::filesystem;
@@ -18,15 +19,6 @@ namespace {
 using FileHash = std::pair<std::string, std::string>;  // path, SHA-256
 
 fs::path record_file(const OpenCampaign& open) { return open.results / "cache" / "measurement.json"; }
-
-// Empty for a file that cannot be read.
-std::string hash_of(const fs::path& path) {
-  try {
-    return sha256_hex(read_file(path));
-  } catch (const InputError&) {
-    return "";
-  }
-}
 
 // Everything but the content of files: flags and listing.
 std::string circumstances(const MeasureRequest& request, const OpenCampaign& open) {
@@ -59,7 +51,7 @@ std::vector<fs::path> files_read(const MeasureRequest& request, const OpenCampai
 
 std::vector<FileHash> hashes_of(const std::vector<fs::path>& files) {
   std::vector<FileHash> hashes;
-  for (const fs::path& file : files) hashes.emplace_back(file.string(), hash_of(file));
+  for (const fs::path& file : files) hashes.emplace_back(file.string(), hash_if_readable(file));
   return hashes;
 }
 
@@ -67,8 +59,9 @@ bool all_unchanged(const std::vector<FileHash>& files, int threads) {
   std::vector<char> same(files.size(), 0);
   tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
   arena.execute([&] {
-    tbb::parallel_for(std::size_t{0}, files.size(),
-                      [&](std::size_t i) { same[i] = hash_of(files[i].first) == files[i].second ? 1 : 0; });
+    tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) {
+      same[i] = hash_if_readable(files[i].first) == files[i].second ? 1 : 0;
+    });
   });
   return std::find(same.begin(), same.end(), 0) == same.end();
 }
@@ -93,7 +86,6 @@ std::optional<MeasurementAnswer> unchanged_measurement(const MeasureRequest& req
         !all_unchanged(record.at("photographs").get<std::vector<FileHash>>(), request.threads)) {
       return std::nullopt;
     }
-    answer.json = read_file(open.results / "quality.json");
     return answer;
   } catch (const nlohmann::json::exception&) {
   } catch (const InputError&) {
@@ -118,9 +110,7 @@ void keep_measurement(const MeasureRequest& request, const OpenCampaign& open,
                                       {"written", hashes_of(answer.written)},
                                       {"exit_code", answer.exit_code},
                                       {"text", answer.text}};
-  write_file_atomically(record_file(open),
-                        record.dump(1, ' ', false, nlohmann::json::error_handler_t::replace),
-                        Keep::unless_power_fails);
+  write_file_atomically(record_file(open), json_text(record, 1), Keep::unless_power_fails);
 }
 
 }  // namespace hexcal

@@ -11,7 +11,7 @@ namespace hexcal {
 
 /// What a finished measurement said and wrote.
 struct MeasurementAnswer {
-  std::string text, json;  ///< for people, for machines
+  std::string text;  ///< for people; for machines it is quality.json
   std::vector<std::filesystem::path> written;
   int exit_code = 0;
 };

@@ -8,6 +8,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "tools/io/json_text.h"
 #include "tools/report/markup.h"
 #include "tools/report/scene_still.h"
 
@@ -132,8 +133,8 @@ Html html_scene(const Scene3d& scene) {
              : fmt::format("; vermilion: one-sigma error ellipsoids, {} times enlarged.",
                            significant_text(scene.ellipsoid_scale, 1));
   out += html_element("p", html_text(key), {{"class", "scene-key"}});
-  out += Html{"<script type=\"application/json\" id=\"scene-data\">" +
-              script_escaped(data.dump(-1, ' ', false, Json::error_handler_t::replace)) + "</script>\n"};
+  out += Html{"<script type=\"application/json\" id=\"scene-data\">" + script_escaped(json_text(data)) +
+              "</script>\n"};
   return out;
 }
 
