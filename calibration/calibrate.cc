@@ -14,10 +14,6 @@ namespace {
 constexpr std::size_t kFewestPoses = 4;
 constexpr double kLeastTiltDeg = 0.5;
 
-bool kinematic_family(const CrossValidation& method) {
-  return method.method == CompensationMethod::kinematic;
-}
-
 // The member of the wanted family with the least cross-validated error; extensions must earn their place.
 std::size_t choose_within(const MethodComparison& comparison, const std::string& wanted) {
   const auto& methods = comparison.methods;
@@ -46,8 +42,7 @@ std::size_t choose_within(const MethodComparison& comparison, const std::string&
 
 std::vector<PaperEvaluation> evaluate_methods(const ObservationSet& observations,
                                               const MethodComparison& comparison,
-                                              const std::vector<Candidate>& candidates,
-                                              const PlatformGeometry& nominal, const ObservationSet& seen) {
+                                              const ObservationSet& seen) {
   std::vector<PaperEvaluation> evaluations;
   std::vector<Target> targets;
   std::map<std::string, std::size_t> index;
@@ -60,10 +55,7 @@ std::vector<PaperEvaluation> evaluate_methods(const ObservationSet& observations
     const CrossValidation& method = comparison.methods[m];
     PaperEvaluation evaluation;
     evaluation.method = method.name;
-    std::string ignored;
-    const bool paper_options_see = method.method != CompensationMethod::kinematic;
-    const auto fitted =
-        fit_candidate(nominal, paper_options_see ? seen : observations, candidates[m], &ignored);
+    const std::optional<FittedMethod>& fitted = comparison.fitted[m];
     std::map<std::size_t, Vector6d> after;
     for (std::size_t p = 0; p < method.held_out.size(); ++p)
       after[method.held_out_index[p]] = pose_error(method.held_out[p].actual, method.held_out[p].target);
@@ -158,8 +150,9 @@ CalibrationReport calibrate(const PlatformGeometry& nominal, const ObservationSe
   const std::vector<Candidate> candidates = candidates_for(used, options.identify);
   report.comparison = compare_methods(nominal, used, candidates, options.comparison);
   for (const std::size_t i : report.comparison.unexplained) report.unexplained.push_back(used.poses[i].id);
-  if (!pairs.empty())
-    report.evaluations = evaluate_methods(used, report.comparison, candidates, nominal, seen);
+  if (!pairs.empty()) report.evaluations = evaluate_methods(used, report.comparison, seen);
+  for (std::size_t m = 0; m < report.evaluations.size(); ++m)
+    report.comparison.methods[m].targets_lost = static_cast<int>(report.evaluations[m].dropped.size());
 
   std::size_t chosen = report.comparison.chosen;
   report.why = report.comparison.why;
@@ -173,11 +166,10 @@ CalibrationReport calibrate(const PlatformGeometry& nominal, const ObservationSe
                                    candidates[chosen].name);
   }
   report.chosen = candidates[chosen].name;
-  std::string reason;
-  const bool kinematic = kinematic_family(report.comparison.methods[chosen]);
-  auto fitted = fit_candidate(nominal, kinematic ? used : seen, candidates[chosen], &reason);
-  if (!fitted) throw InputError(fmt::format("method {}: {}", report.chosen, reason));
-  report.fitted = std::move(*fitted);
+  if (!report.comparison.fitted[chosen]) {
+    throw InputError(fmt::format("method {}: {}", report.chosen, report.comparison.methods[chosen].failure));
+  }
+  report.fitted = *report.comparison.fitted[chosen];
   if (report.fitted.identified)
     report.identifiability = judge_identifiability(nominal, *report.fitted.identified);
   return report;

@@ -93,8 +93,18 @@ class Identification {
     result_.stroke_range = stroke_range_of(nominal, observations);
   }
 
+  // Begins where another identification with the same nominal machine and options ended.
+  void begin_at(const IdentifyResult& start) {
+    started_ = true;
+    nominal_.geometry.B_from_UG = start.machine.geometry.B_from_UG;
+    nominal_.geometry.P_from_LG = start.machine.geometry.P_from_LG;
+    result_.corrections = start.corrections;
+    result_.tolerances = start.tolerances;
+    noise_.leg_sigma_mm = start.leg_sigma_mm;
+  }
+
   IdentifyResult run() {
-    if (options_.frames_unknown) {
+    if (options_.frames_unknown && !started_) {
       const auto frames = align_frames(nominal_.geometry, observations_);
       if (!frames) {
         result_.reason = "the frames of the measured poses cannot be aligned with the hexapod's";
@@ -358,19 +368,22 @@ class Identification {
   double step_squares_ = kInfinity;
   double hyper_change_ = 0;
   bool adapt_tolerances_ = false;
+  bool started_ = false;
 };
 
 }  // namespace
 
 IdentifyResult identify(const PlatformGeometry& nominal, const ObservationSet& observations,
-                        const IdentifyOptions& options) {
+                        const IdentifyOptions& options, const IdentifyResult* start) {
   options.validate();
   if (std::string why = unusable(observations); !why.empty()) {
     IdentifyResult refused;
     refused.reason = std::move(why);
     return refused;
   }
-  return Identification(nominal, observations, options).run();
+  Identification identification(nominal, observations, options);
+  if (start != nullptr) identification.begin_at(*start);
+  return identification.run();
 }
 
 }  // namespace hexcal

@@ -81,8 +81,11 @@ struct IdentifyResult {
 /// Syst. 15 (1998) 395), with tolerances as priors. Gauss-Newton on analytic Jacobians; noise that is not
 /// known is estimated by restricted maximum likelihood (Foerstner's iteration), tolerances by evidence
 /// (MacKay, Neural Comput. 4 (1992) 415). With unknown frames the gauge is that of least corrections of the
-/// joints (in units of their tolerance) to nominal.
+/// joints (in units of their tolerance) to nominal. `start`: where the iterations begin, what was identified
+/// with the same nominal machine and options from nearly the same observations; a few iterations are then
+/// enough.
 [[nodiscard]] IdentifyResult identify(const PlatformGeometry& nominal, const ObservationSet& observations,
-                                      const IdentifyOptions& options = {});
+                                      const IdentifyOptions& options = {},
+                                      const IdentifyResult* start = nullptr);
 
 }  // namespace hexcal

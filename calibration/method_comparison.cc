@@ -1,6 +1,7 @@
 #include "calibration/method_comparison.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -63,17 +64,22 @@ double loss_mm2(const PosePair& pair, double length_mm) {
   return mm * mm + arc_mm * arc_mm;
 }
 
+// `of_all`: the fit to all poses, from which those to the folds begin.
 CrossValidation validate(const PlatformGeometry& nominal, const ObservationSet& observations,
-                         const Candidate& candidate, const std::vector<std::vector<std::size_t>>& folds) {
+                         const Candidate& candidate, const std::vector<std::vector<std::size_t>>& folds,
+                         std::optional<FittedMethod>& of_all) {
   CrossValidation result;
   result.name = candidate.name;
   result.method = candidate.method;
   result.complexity = candidate.complexity;
+  of_all = fit_candidate(nominal, observations, candidate, &result.failure);
+  if (!of_all) return result;
+  const IdentifyResult* start = of_all->identified ? &*of_all->identified : nullptr;
   for (const auto& held_out : folds) {
     std::vector<std::size_t> kept;
     for (std::size_t i = 0; i < observations.poses.size(); ++i)
       if (std::find(held_out.begin(), held_out.end(), i) == held_out.end()) kept.push_back(i);
-    const auto fitted = fit_candidate(nominal, observations.subset(kept), candidate, &result.failure);
+    const auto fitted = fit_candidate(nominal, observations.subset(kept), candidate, &result.failure, start);
     if (!fitted) return result;
     for (const std::size_t i : held_out) {
       const PoseObservation& pose = observations.poses[i];
@@ -188,7 +194,8 @@ std::vector<Candidate> candidates_for(const ObservationSet& observations, const 
 }
 
 std::optional<FittedMethod> fit_candidate(const PlatformGeometry& nominal, const ObservationSet& observations,
-                                          const Candidate& candidate, std::string* reason) {
+                                          const Candidate& candidate, std::string* reason,
+                                          const IdentifyResult* start) {
   FittedMethod fitted;
   fitted.model.method = candidate.method;
   fitted.model.nominal = nominal;
@@ -205,7 +212,7 @@ std::optional<FittedMethod> fit_candidate(const PlatformGeometry& nominal, const
       break;
     }
     case CompensationMethod::kinematic: {
-      fitted.identified = identify(nominal, observations, candidate.identify);
+      fitted.identified = identify(nominal, observations, candidate.identify, start);
       if (fitted.identified->status != IdentifyStatus::identified) {
         *reason = fitted.identified->reason;
         return std::nullopt;
@@ -228,11 +235,18 @@ MethodComparison compare_methods(const PlatformGeometry& nominal, const Observat
   const ObservationSet seen_by_hexapod =
       frames_unknown ? in_hexapod_frames(nominal, observations) : observations;
   const auto folds = folds_of(poses, static_cast<std::size_t>(std::max(1, comparison.folds)));
-  for (const Candidate& candidate : candidates) {
-    const bool kinematic = candidate.method == CompensationMethod::kinematic;
-    comparison.methods.push_back(
-        validate(nominal, kinematic ? observations : seen_by_hexapod, candidate, folds));
-  }
+  comparison.methods.resize(candidates.size());
+  comparison.fitted.resize(candidates.size());
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, candidates.size(), 1),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t c = range.begin(); c < range.end(); ++c) {
+          const bool kinematic = candidates[c].method == CompensationMethod::kinematic;
+          comparison.methods[c] = validate(nominal, kinematic ? observations : seen_by_hexapod, candidates[c],
+                                           folds, comparison.fitted[c]);
+        }
+      },
+      tbb::simple_partitioner());
   const double length_mm = characteristic_length_mm(nominal);
   const std::set<std::size_t> left_out = unexplained(comparison.methods, length_mm);
   comparison.unexplained.assign(left_out.begin(), left_out.end());

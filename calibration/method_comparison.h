@@ -28,10 +28,12 @@ struct FittedMethod {
   std::optional<IdentifyResult> identified;
 };
 
-/// Nothing when the method cannot be fitted to these observations; `reason` then says why.
+/// Nothing when the method cannot be fitted to these observations; `reason` then says why. `start`: as for
+/// identify.
 [[nodiscard]] std::optional<FittedMethod> fit_candidate(const PlatformGeometry& nominal,
                                                         const ObservationSet& observations,
-                                                        const Candidate& candidate, std::string* reason);
+                                                        const Candidate& candidate, std::string* reason,
+                                                        const IdentifyResult* start = nullptr);
 
 /// How well one candidate compensates poses that it has not seen.
 struct CrossValidation {
@@ -63,9 +65,10 @@ struct MethodComparison {
   /// and no choice.
   std::vector<std::size_t> unexplained;
   std::vector<CrossValidation> methods;
-  std::size_t best = 0;    ///< least loss
-  std::size_t chosen = 0;  ///< the simplest within one standard error of the best
-  std::string why;         ///< one line
+  std::vector<std::optional<FittedMethod>> fitted;  ///< the same candidates, fitted to all poses
+  std::size_t best = 0;                             ///< least loss
+  std::size_t chosen = 0;                           ///< the simplest within one standard error of the best
+  std::string why;                                  ///< one line
 };
 
 /// Cross-validates all candidates over the same folds. The error that would remain at a held-out pose is the

@@ -58,6 +58,23 @@ void add_component(NormalEquations::Component& component, RowProducts& informati
   information.add(factor.transpose() * jacobian);
 }
 
+// trace((L L^T)^-1) of a lower triangle L: the squares of the inverse's entries. Column block by column
+// block, of which only the rows from the block on are not zero.
+double trace_of_inverse(const Eigen::MatrixXd& lower) {
+  constexpr Eigen::Index kColumns = 32;
+  const Eigen::Index n = lower.rows();
+  double trace = 0;
+  Eigen::MatrixXd inverse(n, kColumns);
+  for (Eigen::Index from = 0; from < n; from += kColumns) {
+    const Eigen::Index left = n - from;
+    auto columns = inverse.topLeftCorner(left, std::min(kColumns, left));
+    columns.setIdentity();
+    lower.bottomRightCorner(left, left).triangularView<Eigen::Lower>().solveInPlace(columns);
+    trace += columns.squaredNorm();
+  }
+  return trace;
+}
+
 }  // namespace
 
 ReducedPose reduce_to_observed(const LegLinearization& legs, const std::array<bool, 6>& observed,
@@ -180,18 +197,20 @@ NormalEquations normal_equations(const std::vector<ReducedPose>& reduced, const 
       }
     }
     covariance.diagonal().array() += leg_variance(noise);
-    const Eigen::LLT<Eigen::MatrixXd> llt(covariance);
+    const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(covariance);  // into the covariance itself
     llt.matrixL().solveInPlace(residuals);
     llt.matrixL().solveInPlace(jacobian);
     sums.information.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose());
     sums.gradient = jacobian.transpose() * residuals;
     sums.squares = residuals.squaredNorm();
     if (request.components) {
-      const Eigen::MatrixXd factor =
-          llt.matrixL().solve(noise.leg_sigma_mm * Eigen::MatrixXd::Identity(rows, rows));
-      sums.leg.quadratic = (factor.transpose() * residuals).squaredNorm();
-      sums.leg.trace = mean_weight * factor.squaredNorm();
-      sums.leg.information.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose() * factor);
+      // The legs' own part of the covariance, sigma_l^2 I, between C^-1 and C^-1.
+      llt.matrixU().solveInPlace(residuals);
+      llt.matrixU().solveInPlace(jacobian);
+      const double variance = noise.leg_sigma_mm * noise.leg_sigma_mm;
+      sums.leg.quadratic = variance * residuals.squaredNorm();
+      sums.leg.trace = mean_weight * variance * trace_of_inverse(covariance);
+      sums.leg.information.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose(), variance);
     }
   }
   for (RowProducts* products :
