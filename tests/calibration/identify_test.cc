@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "calibration/leg_residuals.h"
+#include "calibration/normal_equations.h"
 #include "kinematics/screw.h"
 #include "tests/calibration/virtual_machine.h"
 #include "tests/support/error_matchers.h"
@@ -273,6 +274,71 @@ TEST(Identify, CommonHomeNoiseIsUsedWhereTheCovarianceTellsIt) {
     independent_squares += error(set);
   }
   EXPECT_LT(joint_squares, 0.8 * independent_squares);
+}
+
+TEST(Identify, BeginsWhereANeighbourEndedAndEndsWhereItWouldHave) {
+  const PlatformGeometry nominal = surrogate_hexapod();
+  const MachineModel truth = as_built(nominal, {}, 3);
+  const ObservationSet all = measured(truth, nominal, random_poses(30, {}, 7), {0.01, 0.002, 5});
+  std::vector<std::size_t> kept(29);
+  for (std::size_t i = 0; i < kept.size(); ++i) kept[i] = i + 1;
+  const ObservationSet set = all.subset(kept);
+  for (const bool frames_unknown : {false, true}) {
+    IdentifyOptions options;
+    options.frames_unknown = frames_unknown;
+    const IdentifyResult neighbour = identify(nominal, all, options);
+    const IdentifyResult cold = identify(nominal, set, options);
+    const IdentifyResult warm = identify(nominal, set, options, &neighbour);
+    ASSERT_EQ(cold.status, IdentifyStatus::identified) << cold.reason;
+    ASSERT_EQ(warm.status, IdentifyStatus::identified) << warm.reason;
+    EXPECT_LT(2 * warm.iterations, cold.iterations);
+    // Noise and tolerances settle until an iteration moves them by less than 2 %, from either side: sigmas
+    // agree to 10 %.
+    EXPECT_NEAR(warm.sigma0, cold.sigma0, 0.02 * cold.sigma0);
+    for (Eigen::Index j = 0; j < cold.covariance.rows(); ++j)
+      EXPECT_NEAR(warm.covariance(j, j), cold.covariance(j, j), 0.2 * cold.covariance(j, j));
+    const Rms apart = remaining(cold.machine, warm.machine, {}, 50, 14);
+    const Rms error = remaining(truth, cold.machine, {}, 50, 14);
+    EXPECT_TRUE(frames_unknown || apart.mm < 0.1 * error.mm) << apart.mm;
+    EXPECT_LT(apart.mm, 0.001);
+  }
+}
+
+TEST(NormalEquations, AJointCovarianceOfIndependentPosesChangesNothing) {
+  const PlatformGeometry drawing = surrogate_hexapod();
+  const MachineModel truth = as_built(drawing, {}, 3);
+  ObservationSet set = measured(truth, drawing, random_poses(20, {}, 7), {0.01, 0.002, 5});
+  set.poses[4].observed = {true, true, false, true, false, true};  // four equations instead of six
+  const IdentifyResult result = identify(drawing, set, {});
+  MachineModel nominal;
+  nominal.geometry = drawing;
+  std::vector<ReducedPose> reduced;
+  for (const PoseObservation& pose : set.poses) {
+    const LegLinearization legs = linearize_legs(result.machine, nominal, result.layout, result.stroke_range,
+                                                 pose.measured, pose.readings, pose.approach);
+    reduced.push_back(reduce_to_observed(legs, pose.observed, result.selection));
+  }
+  const LegNoise noise{.leg_sigma_mm = 0.004};
+  const std::vector<double> weights(set.poses.size(), 0.5);
+  const NormalEquationsRequest request{.components = true, .information_of_pose = false};
+  const NormalEquations alone = normal_equations(reduced, set, weights, noise, request);
+  const auto n = static_cast<Eigen::Index>(set.poses.size());
+  set.joint_covariance.setZero(6 * n, 6 * n);
+  for (Eigen::Index i = 0; i < n; ++i)
+    set.joint_covariance.block<6, 6>(6 * i, 6 * i) = set.poses[static_cast<std::size_t>(i)].covariance;
+  const NormalEquations joint = normal_equations(reduced, set, weights, noise, request);
+
+  const auto lower = [](const Eigen::MatrixXd& m) -> Eigen::MatrixXd {
+    return m.triangularView<Eigen::Lower>();
+  };
+  const auto near = [](const Eigen::MatrixXd& m) { return MatrixNear(m, 1e-9 * m.cwiseAbs().maxCoeff()); };
+  EXPECT_THAT(joint.information, near(alone.information));
+  EXPECT_THAT(joint.gradient, near(alone.gradient));
+  EXPECT_NEAR(joint.squares, alone.squares, 1e-9 * alone.squares);
+  EXPECT_GT(joint.leg.trace, 0);
+  EXPECT_NEAR(joint.leg.trace, alone.leg.trace, 1e-9 * alone.leg.trace);
+  EXPECT_NEAR(joint.leg.quadratic, alone.leg.quadratic, 1e-9 * alone.leg.quadratic);
+  EXPECT_THAT(lower(joint.leg.information), near(lower(alone.leg.information)));
 }
 
 TEST(Identify, RefusesAParameterThatIsNone) {

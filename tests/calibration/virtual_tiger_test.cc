@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +9,7 @@
 #include "tests/calibration/virtual_machine.h"
 #include "tests/support/error_matchers.h"
 #include "tests/support/hexapods.h"
+#include "tools/io/calibration_record.h"
 
 namespace hexcal {
 namespace {
@@ -224,6 +226,48 @@ TEST(Calibrate, NamesTheWrongLeg) {
   EXPECT_TRUE(judged.legs[0].wrong);
   EXPECT_NE(judged.legs[0].sentence.find("scale -6.0"), std::string::npos) << judged.legs[0].sentence;
   for (std::size_t leg = 1; leg < 6; ++leg) EXPECT_FALSE(judged.legs[leg].wrong) << judged.legs[leg].sentence;
+}
+
+TEST(Calibrate, CountsTheTargetsThatACorrectionLoses) {
+  PlatformGeometry nominal = surrogate_hexapod();
+  const MachineModel truth = tiger(2);
+  const ObservationSet set = measured(truth, nominal, random_poses(12, kTigerBox, 13), {0.02, 0.005, 3});
+  // Just enough stroke for what was commanded.
+  std::vector<Target> targets;
+  for (std::size_t k = 0; k < 6; ++k) nominal.actuators[k].max_mm = 0;
+  for (const PoseObservation& pose : set.poses) {
+    targets.push_back({pose.id, *pose.target});
+    const LegVector lengths = lengths_from_readings(nominal, pose.readings);
+    for (std::size_t k = 0; k < 6; ++k)
+      nominal.actuators[k].max_mm =
+          std::max(nominal.actuators[k].max_mm, lengths[static_cast<Eigen::Index>(k)] + 1e-6);
+  }
+  CalibrateOptions options;
+  options.method = "geometry";
+  const CalibrationReport report = calibrate(nominal, set, options);
+  int lost = 0;
+  for (const CorrectedCommand& command : compensate(report.fitted.model, targets))
+    lost += command.status == CommandStatus::ok ? 0 : 1;
+  EXPECT_GT(lost, 0);
+  for (const CrossValidation& method : report.comparison.methods) {
+    if (method.name == "kinematic") {
+      EXPECT_EQ(method.targets_lost, lost);
+    } else if (method.name == "none") {
+      EXPECT_EQ(method.targets_lost, 0);
+    }
+  }
+}
+
+TEST(Calibrate, ThreadsChangeNothing) {
+  const MachineModel truth = tiger(2);
+  const ObservationSet set =
+      measured(truth, surrogate_hexapod(), random_poses(12, kTigerBox, 13), {0.02, 0.005, 3});
+  std::vector<std::string> records;
+  for (const std::size_t threads : {1, 4}) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    records.push_back(calibration_record_text("key", calibrate(surrogate_hexapod(), set, {})));
+  }
+  EXPECT_EQ(records[0], records[1]);
 }
 
 TEST(Calibrate, RefusesTooFewPoses) {

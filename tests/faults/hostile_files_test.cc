@@ -208,8 +208,8 @@ TEST(HostileFiles, ATableWithoutLinesOrOfManyColumnsIsRefusedAtOnce) {
   fs::resize_file(path, std::uintmax_t{200} << 20);
   const double start = processor_seconds();
   EXPECT_THAT([&path] { (void)CsvTable::read(path); }, ThrowsInputError("a.csv:2: no CSV table"));
-  EXPECT_THROW(CsvTable::parse(std::string(10 << 20, ','), "a.csv"), InputError);
-  EXPECT_THROW(CsvTable::parse(std::string(10 << 20, '"'), "a.csv"), InputError);
+  EXPECT_THROW((void)CsvTable::parse(std::string(10 << 20, ','), "a.csv"), InputError);
+  EXPECT_THROW((void)CsvTable::parse(std::string(10 << 20, '"'), "a.csv"), InputError);
   EXPECT_LT(processor_seconds() - start, kPatienceS);
 }
 
