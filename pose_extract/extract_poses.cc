@@ -298,7 +298,7 @@ void ExtractOptions::validate() const {
   if (map_poses < 0 || map_poses == 1) {
     throw InputError(fmt::format("option map_poses: found {}, wanted 2 or more, or 0", map_poses));
   }
-  if (min_intersection_deg < 0) {
+  if (!(min_intersection_deg >= 0)) {
     throw InputError(
         fmt::format("option min_intersection_deg: found {}, wanted 0 or more", min_intersection_deg));
   }

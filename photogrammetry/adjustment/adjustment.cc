@@ -113,7 +113,7 @@ void AdjustmentOptions::validate() const {
     throw InputError(fmt::format("adjustment option outlier_probability: found {}, wanted below 0.5",
                                  outlier_probability));
   }
-  if (print_scale_sigma < 0) {
+  if (!(print_scale_sigma >= 0)) {
     throw InputError(
         fmt::format("adjustment option print_scale_sigma: found {}, wanted 0 or more", print_scale_sigma));
   }

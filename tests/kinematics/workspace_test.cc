@@ -64,15 +64,6 @@ TEST(Workspace, NoBoxWhereHomeIsNotValid) {
   EXPECT_FALSE(largest_box(surrogate_hexapod(), options).found);
 }
 
-TEST(Workspace, RefusesOptionsByName) {
-  SliceOptions options;
-  options.axis_v = 0;
-  EXPECT_THROW(options.validate(), InputError);
-  BoxOptions box;
-  box.grid = 1;
-  EXPECT_THROW(box.validate(), InputError);
-}
-
 // Every failure has a name.
 TEST(GeometryFault, NamesWhatNoMachineCanHave) {
   const auto fault = [](auto change) {

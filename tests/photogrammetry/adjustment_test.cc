@@ -8,6 +8,8 @@
 #include <numeric>
 
 #include "photogrammetry/adjustment/marker_map.h"
+#include "photogrammetry/markers/detect.h"
+#include "tests/support/error_matchers.h"
 #include "tests/support/observation_scene.h"
 #include "tests/support/rigid_matchers.h"
 
@@ -374,6 +376,18 @@ TEST(MarkerMap, AMovedMarkerIsLeftOutOfItsEpochAlone) {
   }
   EXPECT_EQ(result.epoch_residuals[9].rejected, moved);
   EXPECT_LT(pose_errors(scene, result).rms_um, 2);
+}
+
+TEST(Adjustment, OptionsAreRefusedByName) {
+  expect_option_refused<AdjustmentOptions>("squareness_sigma_mm: found 0, wanted more than 0",
+                                           [](auto& o) { o.squareness_sigma_mm = 0; });
+  expect_option_refused<AdjustmentOptions>("outlier_probability: found 0.5, wanted below 0.5",
+                                           [](auto& o) { o.outlier_probability = 0.5; });
+  expect_option_refused<AdjustmentOptions>("print_scale_sigma: found nan, wanted 0 or more",
+                                           [](auto& o) { o.print_scale_sigma = std::nan(""); });
+  expect_option_refused<DetectionOptions>("ids has -1, wanted none below 0", [](auto& o) { o.ids = {-1}; });
+  expect_option_refused<DetectionOptions>("min_side_px is 1, wanted 4 to 100000",
+                                          [](auto& o) { o.refine.min_side_px = 1; });
 }
 
 TEST(Adjustment, SameInputGivesTheSameBits) {

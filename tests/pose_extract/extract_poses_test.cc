@@ -4,6 +4,7 @@
 
 #include "kinematics/geometry/input_error.h"
 #include "tests/support/campaign_scene.h"
+#include "tests/support/error_matchers.h"
 
 namespace hexcal {
 namespace {
@@ -357,6 +358,15 @@ TEST_F(ExtractPoses, OnlyFixedMarkersIsAPlainPhotogrammetryProject) {
   EXPECT_EQ(result.points.size(), 40U);
   EXPECT_TRUE(result.checks.at(0).measured);
   EXPECT_TRUE(result.photographs.at(0).UG_from_camera.has_value());
+}
+
+TEST_F(ExtractPoses, OptionsAreRefusedByName) {
+  expect_option_refused<ExtractOptions>("option max_sigma_mm: found 0, wanted more than 0",
+                                        [](auto& o) { o.max_sigma_mm = 0; });
+  expect_option_refused<ExtractOptions>("option map_poses: found 1, wanted 2 or more, or 0",
+                                        [](auto& o) { o.map_poses = 1; });
+  expect_option_refused<ExtractOptions>("option min_intersection_deg: found nan, wanted 0 or more",
+                                        [](auto& o) { o.min_intersection_deg = std::nan(""); });
 }
 
 TEST_F(ExtractPoses, LgFromNominalCoordinates) {
