@@ -166,10 +166,7 @@ CalibrationReport calibrate(const PlatformGeometry& nominal, const ObservationSe
                                    candidates[chosen].name);
   }
   report.chosen = candidates[chosen].name;
-  if (!report.comparison.fitted[chosen]) {
-    throw InputError(fmt::format("method {}: {}", report.chosen, report.comparison.methods[chosen].failure));
-  }
-  report.fitted = *report.comparison.fitted[chosen];
+  report.fitted = *report.comparison.fitted[chosen];  // what cannot be fitted is not chosen
   if (report.fitted.identified)
     report.identifiability = judge_identifiability(nominal, *report.fitted.identified);
   return report;
