@@ -6,6 +6,7 @@
 
 #include "kinematics/forward.h"
 #include "kinematics/geometry/covariance.h"
+#include "kinematics/screw.h"
 #include "tests/kinematics/dietmaier.h"
 #include "tests/support/hexapods.h"
 #include "tests/support/rigid_matchers.h"
@@ -59,12 +60,19 @@ TEST(AssemblyModes, ListTheFeasiblePoseFirstAndItsMirrorImage) {
 }
 
 TEST(AssemblyModes, SaysWhenThereIsNone) {
-  const PlatformGeometry g = surrogate_hexapod();
-  LegVector lengths = leg_lengths(g, g.home_B_from_P());
+  PlatformGeometry g = surrogate_hexapod();
+  const LegVector home_mm = leg_lengths(g, g.home_B_from_P());
+  LegVector lengths = home_mm;
   lengths[0] = 5000;
   EXPECT_TRUE(assembly_modes(g, lengths).modes.empty());
   lengths[0] = -1;
   EXPECT_FALSE(assembly_modes(g, lengths).complete());
+  EXPECT_THAT(assembly_modes(g, lengths).reason, testing::HasSubstr("not positive numbers"));
+  g.screw = screw_with_tangential_axes(g, 5);
+  const AssemblyModes screwed = assembly_modes(g, home_mm);
+  EXPECT_EQ(screwed.reason, "a machine with a screw lead is not handled");
+  EXPECT_FALSE(screwed.complete());
+  EXPECT_TRUE(screwed.modes.empty());
 }
 
 TEST(Forward, ReturnsToEachOfDietmaiersPostures) {

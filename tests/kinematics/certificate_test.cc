@@ -71,16 +71,36 @@ TEST(Certificate, SaysWhenTheBoxHoldsNoneOrAnother) {
 TEST(Certificate, RefusesWhatItCannotProve) {
   PlatformGeometry g = nategh_agheli_hexapod();
   const LegVector lengths = leg_lengths(g, g.home_B_from_P());
+  const auto expect_undecided = [&](const LegVector& legs, const PoseBox& box, const std::string& words,
+                                    const CertificateOptions& options = {}) {
+    const Certificate c = certify(g, legs, {}, box, options);
+    EXPECT_EQ(c.status, CertificateStatus::undecided) << words;
+    EXPECT_THAT(c.reason, testing::HasSubstr(words));
+  };
   PoseBox box = default_certificate_box();
   box.upper[4] = 100 * kRadPerDeg;
-  EXPECT_EQ(certify(g, lengths, {}, box).status, CertificateStatus::undecided);
-  EXPECT_EQ(certify(g, lengths, {}, default_certificate_box(), {.largest_boxes = 1}).status,
-            CertificateStatus::undecided);
+  expect_undecided(lengths, box, "angles beyond +-180 deg");
+  expect_undecided(lengths, default_certificate_box(), "the search ran out of boxes", {.largest_boxes = 1});
   LegVector bad = lengths;
   bad[0] = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(certify(g, bad, {}, default_certificate_box()).status, CertificateStatus::undecided);
+  expect_undecided(bad, default_certificate_box(), "not finite");
   g.screw = screw_with_tangential_axes(g, 5);
-  EXPECT_EQ(certify(g, lengths, {}, default_certificate_box()).status, CertificateStatus::undecided);
+  expect_undecided(lengths, default_certificate_box(), "screw lead");
+}
+
+// At Fichter's singularity two poses fall together: no box around them holds exactly one.
+TEST(Certificate, ASingularPoseStaysUndecided) {
+  const PlatformGeometry g = surrogate_hexapod();
+  const Pose singular{{0, 0, 0}, {0, 0, 90 * kRadPerDeg}};
+  PoseBox box;
+  box.upper = Vector6d::Constant(1e-4);
+  box.lower = -box.upper;
+  box.lower[5] += singular.rpy_rad[2];
+  box.upper[5] += singular.rpy_rad[2];
+  const Certificate c =
+      certify(g, leg_lengths(g, g.B_from_P(singular)), singular, box, {.smallest_mm = 1e-3});
+  EXPECT_EQ(c.status, CertificateStatus::undecided);
+  EXPECT_EQ(c.reason, "a pose in the box is too near a singularity");
 }
 
 // Around each of the 40 postures, boxes that hold others too.

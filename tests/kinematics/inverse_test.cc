@@ -1,5 +1,6 @@
 #include "kinematics/inverse.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <random>
@@ -59,7 +60,10 @@ TEST(Inverse, ReadingsFollowOffsetAndScale) {
 TEST(Inverse, JointLimits) {
   PlatformGeometry g = surrogate_hexapod();
   g.joint_limits = JointLimits{10 * kRadPerDeg, 80 * kRadPerDeg};
-  EXPECT_EQ(at(g, pose(100, 0, 0, 0, 0, 0)).verdict, PoseVerdict::base_joint);
+  const InverseResult aside = at(g, pose(100, 0, 0, 0, 0, 0));
+  EXPECT_EQ(aside.verdict, PoseVerdict::base_joint);
+  EXPECT_EQ(reason(aside), fmt::format("base joint {} would turn {:.2f} deg", aside.leg + 1,
+                                       aside.base_angles_rad.maxCoeff() * kDegPerRad));
   g.joint_limits = JointLimits{80 * kRadPerDeg, 10 * kRadPerDeg};
   const InverseResult tilted = at(g, pose(0, 0, 0, 15, 0, 0));
   EXPECT_EQ(tilted.verdict, PoseVerdict::platform_joint);
@@ -97,7 +101,9 @@ TEST(Inverse, ANumberThatIsNoneIsNoPose) {
   const PlatformGeometry g = surrogate_hexapod();
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
-    EXPECT_EQ(at(g, pose(bad, 0, 0, 0, 0, 0)).verdict, PoseVerdict::not_a_pose);
+    const InverseResult r = at(g, pose(bad, 0, 0, 0, 0, 0));
+    EXPECT_EQ(r.verdict, PoseVerdict::not_a_pose);
+    EXPECT_EQ(reason(r), "the pose is not finite");
     EXPECT_EQ(at(g, pose(0, 0, 0, 0, bad, 0)).verdict, PoseVerdict::not_a_pose);
   }
 }
@@ -110,7 +116,9 @@ TEST(Singularity, AQuarterTurnIsSingular) {
   const InverseResult r = at(g, pose(0, 0, 0, 0, 0, 90));
   EXPECT_LE(r.singularity->sigma_min, 1e-12);
   EXPECT_EQ(at(g, pose(0, 0, 0, 0, 0, 89)).verdict, PoseVerdict::near_singular);
-  EXPECT_EQ(at(g, pose(0, 0, 0, 0, 0, 91)).verdict, PoseVerdict::beyond_singular);
+  const InverseResult beyond = at(g, pose(0, 0, 0, 0, 0, 91));
+  EXPECT_EQ(beyond.verdict, PoseVerdict::beyond_singular);
+  EXPECT_EQ(reason(beyond), "the pose lies beyond a singularity");
   EXPECT_THAT(reason(at(g, pose(0, 0, 0, 0, 0, 89))), HasSubstr("near a singularity"));
   // The distance is a distance: from 5 deg away, 5 deg.
   EXPECT_NEAR(at(g, pose(0, 0, 0, 0, 0, 85)).singularity->distance_deg, 5, 0.3);

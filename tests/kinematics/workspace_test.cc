@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/screw.h"
 #include "tests/support/hexapods.h"
 
 namespace hexcal {
@@ -79,9 +80,29 @@ TEST(GeometryFault, NamesWhatNoMachineCanHave) {
   EXPECT_THAT(fault([](G& g) { g.actuators[1].max_mm = 10; }), HasSubstr("leg 2: max_mm"));
   EXPECT_THAT(fault([](G& g) { g.actuators[1].min_mm = 0; }), HasSubstr("leg 2: min_mm"));
   EXPECT_THAT(fault([](G& g) { g.actuators[0].mm_per_unit = 0; }), HasSubstr("mm_per_unit is zero"));
+  EXPECT_THAT(fault([](G& g) { g.actuators[3].offset_mm = kNan; }),
+              HasSubstr("leg 4: offset_mm or mm_per_unit is not finite"));
+  EXPECT_THAT(fault([](G& g) { g.P_from_LG.translation.z() = kNan; }),
+              HasSubstr("B_from_UG or P_from_LG is not finite"));
   EXPECT_THAT(fault([](G& g) { g.gd_mm = kNan; }), HasSubstr("gd_mm"));
   EXPECT_THAT(fault([](G& g) { g.leg_radius_mm = -1; }), HasSubstr("radius"));
   EXPECT_THAT(fault([](G& g) { g.joint_limits->base_rad = 0; }), HasSubstr("base joints' limit"));
+  EXPECT_THAT(fault([](G& g) { g.joint_limits->platform_rad = 0; }), HasSubstr("platform joints' limit"));
+  EXPECT_THAT(fault([](G& g) {
+                g.joint_limits->base_axes_rad = {0.5, 0};
+              }),
+              HasSubstr("the limits about the base joints' axes must be greater than zero"));
+  EXPECT_THAT(fault([](G& g) { g.screw = screw_with_tangential_axes(g, kNan); }), HasSubstr("lead"));
+  EXPECT_THAT(fault([](G& g) {
+                g.screw = screw_with_tangential_axes(g, 5);
+                g.screw->base_axes[1] *= 2;
+              }),
+              HasSubstr("leg 2: the screw's base axis has no length 1"));
+  EXPECT_THAT(fault([](G& g) {
+                g.screw = screw_with_tangential_axes(g, 5);
+                g.screw->platform_axes[5].setZero();
+              }),
+              HasSubstr("leg 6: the screw's platform axis has no length 1"));
   EXPECT_THAT(fault([](G& g) { g.platform_joints_mm.fill(Eigen::Vector3d(1, 2, 3)); }),
               HasSubstr("all platform joints coincide"));
   EXPECT_THAT(fault([](G& g) {
@@ -93,6 +114,8 @@ TEST(GeometryFault, NamesWhatNoMachineCanHave) {
                 for (std::size_t i = 0; i < 6; ++i) g.base_joints_mm[i] = {static_cast<double>(i) * 50, 0, 0};
               }),
               HasSubstr("one line"));
+  EXPECT_THAT(fault([](G& g) { g.base_joints_mm[2] = g.home_B_from_P() * g.platform_joints_mm[2]; }),
+              HasSubstr("leg 3: has no length at home"));
   // Similar hexagons move freely in every pose.
   EXPECT_THAT(fault([](G& g) {
                 for (std::size_t i = 0; i < 6; ++i) g.platform_joints_mm[i] = 0.5 * g.base_joints_mm[i];
