@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -14,6 +15,7 @@ namespace {
 
 constexpr int kIterations = 30;
 constexpr double kOutlierSigmas = 5.0;
+constexpr double kNarrowest = 0.01;  // least width over length of the points that set a frame
 
 struct DatumPoint {
   const NominalPoint* nominal = nullptr;
@@ -58,8 +60,8 @@ Eigen::Matrix3d weight_of(const DatumPoint& point, const Rigid3& frame_from_body
 }
 
 // Start from every triple of a few spread points; the one with the least median residual wins, so that up to
-// half of the nominal coordinates may be wrong.
-void start_robustly(const std::vector<DatumPoint>& points, bool with_scale, DatumFrame& frame) {
+// half of the nominal coordinates may be wrong. False if no triple spans a triangle.
+bool start_robustly(const std::vector<DatumPoint>& points, bool with_scale, DatumFrame& frame) {
   const std::size_t n = points.size();
   const std::size_t stride = std::max<std::size_t>(1, n / 12);
   double least = std::numeric_limits<double>::infinity();
@@ -92,6 +94,26 @@ void start_robustly(const std::vector<DatumPoint>& points, bool with_scale, Datu
       }
     }
   }
+  return std::isfinite(least);
+}
+
+// The used points leave the turn about a line open, as good as.
+bool on_a_line(const std::vector<DatumPoint>& points) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  double count = 0;
+  for (const DatumPoint& point : points) {
+    if (!point.used) continue;
+    mean += point.in_body;
+    count += 1;
+  }
+  mean /= count;
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const DatumPoint& point : points) {
+    if (point.used) scatter += (point.in_body - mean) * (point.in_body - mean).transpose();
+  }
+  const Eigen::Vector3d spread =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter, Eigen::EigenvaluesOnly).eigenvalues();
+  return !(spread[1] > kNarrowest * kNarrowest * spread[2]);
 }
 
 }  // namespace
@@ -114,7 +136,10 @@ DatumFrame frame_from_nominal(const Network& network, const AdjustmentResult& ad
                                points.size(), nominal.size());
     return frame;
   }
-  start_robustly(points, with_scale, frame);
+  if (!start_robustly(points, with_scale, frame)) {
+    frame.reason = "its nominal points lie on a line";
+    return frame;
+  }
   Matrix7d inverse_normal = Matrix7d::Zero();
   for (int i = 0; i < kIterations; ++i) {
     // Robust scale: nominal sigmas may promise too much.
@@ -136,6 +161,14 @@ DatumFrame frame_from_nominal(const Network& network, const AdjustmentResult& ad
       normal += j.transpose() * w * j;
       right += j.transpose() * w * residuals[p];
     }
+    if (std::count_if(points.begin(), points.end(), [](const DatumPoint& p) { return p.used; }) < 3) {
+      frame.reason = "fewer than 3 of its nominal points agree with the measurement";
+      return frame;
+    }
+    if (on_a_line(points)) {
+      frame.reason = "those of its nominal points that agree with the measurement lie on a line";
+      return frame;
+    }
     if (!with_scale) {
       normal.row(6).setZero();
       normal.col(6).setZero();
@@ -144,17 +177,12 @@ DatumFrame frame_from_nominal(const Network& network, const AdjustmentResult& ad
     }
     inverse_normal = normal.inverse();
     const Vector7d step = inverse_normal * right;
-    if (!step.allFinite()) {
-      frame.reason = "its nominal points lie on a line";
-      return frame;
-    }
     frame.frame_from_body = perturbed(frame.frame_from_body, step.head<6>());
     frame.scale *= std::exp(step[6]);
     if (step.norm() < 1e-12) break;
   }
   frame.by_common = Eigen::Matrix<double, 7, Eigen::Dynamic>::Zero(7, adjusted.layout.size);
   const Eigen::Matrix3d rotation = frame.frame_from_body.rotation_matrix();
-  int used = 0;
   for (const DatumPoint& point : points) {
     const Eigen::Vector3d measured = frame.frame_from_body * (frame.scale * point.in_body);
     const Eigen::Matrix3d w = weight_of(point, frame.frame_from_body);
@@ -167,16 +195,11 @@ DatumFrame frame_from_nominal(const Network& network, const AdjustmentResult& ad
           frame.residuals.back().residual_mm.norm()));
       continue;
     }
-    ++used;
     Eigen::Matrix<double, 7, 3> gain =
         inverse_normal * jacobian_at(frame.frame_from_body, frame.scale, point.in_body).transpose() * w;
     if (!with_scale) gain.row(6).setZero();
     frame.by_common -= gain * (frame.scale * rotation) * point.by_common;
     frame.own += gain * (point.nominal->sigma_mm * point.nominal->sigma_mm) * gain.transpose();
-  }
-  if (used < 3) {
-    frame.reason = "fewer than 3 of its nominal points agree with the measurement";
-    return frame;
   }
   frame.ok = true;
   frame.reason.clear();

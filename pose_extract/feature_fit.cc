@@ -172,15 +172,15 @@ FittedFeature fit_feature(Feature::Kind kind, const Eigen::Matrix3Xd& points, co
         right -= weight * r[k] * j;
       }
     }
+    if (!normal.allFinite() || !right.allFinite()) {
+      fitted.reason = "the fit has no solution";
+      return fitted;
+    }
     // The place may slide along a plane, line or axis: the smallest step is taken.
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition;
     decomposition.setThreshold(1e-10);
     decomposition.compute(normal);
     const Eigen::VectorXd step = decomposition.solve(right);
-    if (!step.allFinite()) {
-      fitted.reason = "the fit has no solution";
-      return fitted;
-    }
     shape = moved(shape, step, kind);
     if (step.norm() < 1e-12) break;
   }

@@ -146,6 +146,104 @@ TEST(DatumFeatures, ParallelDirectionsAreRefused) {
   EXPECT_THAT(frame.reason, HasSubstr("parallel"));
 }
 
+TEST(DatumFeatures, SayWhichFeatureIsTooWeakForAFrame) {
+  const ObservationScene scene = twelve_sided_grip({});
+  AdjustmentResult adjusted = adjust_network(scene.network, {});
+  ASSERT_EQ(adjusted.status, AdjustmentStatus::ok) << adjusted.reason;
+  FeatureFrame good;
+  good.z = feature(Feature::Kind::plane, 13, 17);
+  good.x = feature(Feature::Kind::line, 13, 14);
+  good.origin = feature(Feature::Kind::point, 15, 15);
+  const auto expect = [&](const std::string& words, auto change) {
+    FeatureFrame features = good;
+    change(features);
+    const DatumFrame frame = frame_from_features(scene.network, adjusted, Body::fixed, features);
+    EXPECT_EQ(frame.ok, words.empty()) << words;
+    EXPECT_THAT(frame.reason, HasSubstr(words));
+  };
+  expect("", [](FeatureFrame&) {});
+  expect("none of a feature's markers was measured",
+         [](auto& f) { f.origin = feature(Feature::Kind::point, 90, 92); });
+  expect("its x feature: too few of its points were measured",
+         [](auto& f) { f.x = feature(Feature::Kind::line, 17, 18); });
+  expect("z and x must be a plane, line, circle or cylinder: a point or sphere has no direction",
+         [](auto& f) { f.x = feature(Feature::Kind::point, 13, 13); });
+  // A line so steep on the plane that a last digit decides whether z and x are parallel: no derivative.
+  const Rigid3& from = adjusted.geometry.body_from_marker[13];
+  const double steep = 10 * kRadPerDeg + 1e-8;
+  adjusted.geometry.body_from_marker[0].translation =
+      from.translation + from.rotation * Eigen::Vector3d(100 * std::sin(steep), 0, 100 * std::cos(steep));
+  expect("its features are too weak to construct it",
+         [](auto& f) { f.x.points = {{13, -1}, {0, -1}}; });
+}
+
+TEST(FeatureFit, WithoutASolutionSaysSo) {
+  Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Random(3, 8);
+  points(0, 3) = std::numeric_limits<double>::quiet_NaN();
+  for (const Feature::Kind kind : {Feature::Kind::plane, Feature::Kind::line, Feature::Kind::circle,
+                                   Feature::Kind::cylinder, Feature::Kind::sphere}) {
+    const FittedFeature fitted = fit_feature(kind, points, Eigen::VectorXd::Constant(8, 0.01), points, points,
+                                             std::vector<char>(8, 1));
+    EXPECT_FALSE(fitted.ok);
+    EXPECT_EQ(fitted.reason, "the fit has no solution");
+  }
+}
+
+// Nominal coordinates of the grip's markers from 0 on, as many as there are sigmas.
+std::vector<NominalPoint> nominal_centres(const ObservationScene& scene,
+                                          const std::vector<double>& sigma_mm) {
+  std::vector<NominalPoint> nominal;
+  for (std::size_t m = 0; m < sigma_mm.size(); ++m)
+    nominal.push_back(
+        {{scene.network.markers[m].id, -1}, scene.body_from_marker[m].translation, sigma_mm[m]});
+  return nominal;
+}
+
+TEST(DatumNominal, SaysWhyItsPointsMakeNoFrame) {
+  const ObservationScene scene = twelve_sided_grip({});
+  AdjustmentResult adjusted = adjust_network(scene.network, {});
+  ASSERT_EQ(adjusted.status, AdjustmentStatus::ok) << adjusted.reason;
+  const auto expect = [&](const std::string& words, const std::vector<NominalPoint>& nominal) {
+    for (const bool with_scale : {false, true}) {
+      const DatumFrame frame =
+          frame_from_nominal(scene.network, adjusted, Body::fixed, nominal, with_scale);
+      EXPECT_EQ(frame.ok, words.empty()) << words;
+      EXPECT_EQ(frame.reason, words);
+    }
+  };
+  std::vector<NominalPoint> nominal = nominal_centres(scene, {0.01, 0.01, 0.01});
+  expect("", nominal);
+  nominal[1].point.id = 90;
+  expect("only 2 of the 3 nominal points were measured, wanted at least 3", nominal);
+  // What is promised to be exact is 3 mm off; without it there are two.
+  nominal = nominal_centres(scene, {1e-4, 10, 10});
+  nominal[0].xyz_mm.x() += 3;
+  expect("fewer than 3 of its nominal points agree with the measurement", nominal);
+  // Markers 0 to 3 in a row along the grip, as good as; the turn about it is left open.
+  for (std::size_t m = 0; m < 4; ++m) {
+    adjusted.geometry.body_from_marker[m].translation =
+        adjusted.geometry.body_from_marker[12].translation +
+        Eigen::Vector3d(12.3, 7.7, -3.1) * static_cast<double>(m) + Eigen::Vector3d(0, m == 1 ? 1e-3 : 0, 0);
+  }
+  nominal = nominal_centres(scene, {0.01, 0.01, 0.01, 0.01});
+  for (std::size_t m = 0; m < 4; ++m)
+    nominal[m].xyz_mm = Eigen::Vector3d(12.3, 7.7, -3.1) * static_cast<double>(m);
+  expect("its nominal points lie on a line", nominal);
+  nominal.push_back({{6, -1}, scene.body_from_marker[6].translation, 1e-4});
+  nominal.back().xyz_mm += Eigen::Vector3d(40, -20, 30);
+  for (std::size_t m = 0; m < 4; ++m) nominal[m].sigma_mm = 10;
+  expect("those of its nominal points that agree with the measurement lie on a line", nominal);
+}
+
+TEST(DatumFrames, OfABodyWithoutAMeasuredMarkerIsNone) {
+  const ObservationScene scene = twelve_sided_grip({});
+  const AdjustmentResult adjusted = adjust_network(scene.network, {});
+  EXPECT_TRUE(frame_from_first_marker(scene.network, adjusted, Body::fixed).ok);
+  const DatumFrame frame = frame_from_first_marker(scene.network, adjusted, Body::moving);
+  EXPECT_FALSE(frame.ok);
+  EXPECT_EQ(frame.reason, "none of its markers was measured");
+}
+
 TEST(FeatureFit, RecoversEachKindExactly) {
   Eigen::Matrix3Xd points(3, 24);
   Eigen::Matrix3Xd normals(3, 24);

@@ -96,6 +96,21 @@ TEST_F(ImageFolders, FlatFolderWithATable) {
   EXPECT_EQ(listing.skipped.at(0).name, "c.jpg");
 }
 
+TEST_F(ImageFolders, ThumbnailsByNameAndFilesNamedTwiceAreSkippedWithWords) {
+  for (const char* name : {"p1/a.jpg", "p1/a_Thumb.jpg"}) touch(name);
+  const ImageListing folders = list_images(root_, {});
+  EXPECT_THAT(names(folders), ElementsAre("p1|p1/a.jpg"));
+  ASSERT_EQ(folders.skipped.size(), 1U);
+  EXPECT_EQ(folders.skipped[0].name, "p1/a_Thumb.jpg");
+  EXPECT_EQ(folders.skipped[0].reason, "a thumbnail by its name");
+  touch("b.jpg");
+  const ImageListing table = list_images(root_, {{}, {{"b.jpg", "home"}, {"B.JPG", "p1"}}});
+  EXPECT_THAT(names(table), ElementsAre("home|b.jpg"));
+  ASSERT_EQ(table.skipped.size(), 1U);
+  EXPECT_EQ(table.skipped[0].name, "b.jpg");
+  EXPECT_EQ(table.skipped[0].reason, "named twice in the table of images; not taken for pose p1");
+}
+
 TEST_F(ImageFolders, AFileOfTheTableThatIsMissingIsListedForItsStatusToSaySo) {
   touch("a.jpg");
   const ImageListing listing = list_images(root_, {{}, {{"missing.jpg", "home"}, {"A.JPG", "p1"}}});
