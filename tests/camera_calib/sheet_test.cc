@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "kinematics/geometry/input_error.h"
+#include "tests/support/error_matchers.h"
 
 namespace hexcal {
 namespace {
@@ -17,6 +17,25 @@ Sheet design_aprilgrid() {
   sheet.marker_mm = 40;
   sheet.spacing_mm = 15;
   sheet.first_id = 200;
+  return sheet;
+}
+
+Sheet cut_out_markers() {
+  Sheet sheet = design_aprilgrid();
+  sheet.kind = SheetKind::markers;
+  sheet.columns = sheet.rows = 2;
+  sheet.marker_mm = 24;
+  sheet.ids = {3, 4, 5, 9};
+  return sheet;
+}
+
+Sheet ringed_dots() {
+  Sheet sheet;
+  sheet.kind = SheetKind::photomodeler;
+  sheet.columns = 10;
+  sheet.rows = 8;
+  sheet.pitch_mm = 20;
+  sheet.dot_mm = 4.5;
   return sheet;
 }
 
@@ -90,16 +109,35 @@ TEST(Sheet, ValidateNamesTheFieldAndItsValue) {
   EXPECT_THROW(sheet.validate(), InputError);
   sheet = design_aprilgrid();
   sheet.first_id = 580;  // the family ends at 586
-  EXPECT_THROW(
-      {
-        try {
-          sheet.validate();
-        } catch (const InputError& error) {
-          EXPECT_THAT(error.what(), testing::HasSubstr("id 587 is not in tag36h11"));
-          throw;
-        }
-      },
-      InputError);
+  EXPECT_THAT([&sheet] { sheet.validate(); }, ThrowsInputError("id 587 is not in tag36h11"));
+  sheet = cut_out_markers();
+  sheet.ids[2] = sheet.ids[0];
+  EXPECT_THAT([&sheet] { sheet.validate(); },
+              ThrowsInputError("sheet: id 3 stands twice, wanted each id once"));
+  sheet = ringed_dots();
+  sheet.rows = 5;
+  EXPECT_THAT([&sheet] { sheet.validate(); },
+              ThrowsInputError("sheet: columns and rows is 5, wanted at least 6"));
+}
+
+TEST(Sheet, IsDescribedInALine) {
+  EXPECT_EQ(describe_sheet(design_aprilgrid()),
+            "aprilgrid tag36h11 8 x 6, tags 40 mm, gap 15 mm, ids 200-247");
+  Sheet sheet = ringed_dots();
+  sheet.validate();
+  EXPECT_EQ(describe_sheet(sheet), "photomodeler 10 x 8 dots, pitch 20 mm, dots 4.5 mm");
+  sheet.kind = SheetKind::chessboard;
+  EXPECT_EQ(describe_sheet(sheet), "chessboard 10 x 8 squares of 20 mm");
+  sheet.kind = SheetKind::charuco;
+  sheet.family = "DICT_5X5_250";
+  sheet.marker_mm = 15;
+  EXPECT_EQ(describe_sheet(sheet), "charuco DICT_5X5_250 10 x 8 squares of 20 mm, markers 15 mm, ids 0-39");
+  sheet.kind = SheetKind::dots;
+  sheet.family = "tag36h11";
+  EXPECT_EQ(describe_sheet(sheet), "dots 10 x 8, pitch 20 mm, dots 4.5 mm, markers tag36h11 15 mm, ids 0-5");
+  sheet = cut_out_markers();
+  sheet.validate();
+  EXPECT_EQ(describe_sheet(sheet), "markers tag36h11, 24 mm, ids 3-5 9");
 }
 
 }  // namespace
