@@ -1,6 +1,6 @@
 #include "tools/io/camera_export.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <opencv2/core/persistence.hpp>
 #include <sstream>
@@ -74,6 +74,17 @@ TEST(CameraExport, ColmapCountsFromThePixelsCorner) {
   line >> id >> model >> width >> height >> fx >> fy >> cx;
   EXPECT_EQ(model, "FULL_OPENCV");
   EXPECT_DOUBLE_EQ(cx, brown().model.cx_px() + 0.5);
+}
+
+TEST(CameraExport, MrcalTakesTheCameraOfItsOwnKindUnchanged) {
+  const CameraExport out = export_camera(brown(), "mrcal");
+  EXPECT_EQ(out.model, "LENSMODEL_OPENCV5");
+  EXPECT_EQ(out.rms_px, 0);
+  EXPECT_THAT(
+      out.text,
+      ::testing::HasSubstr("{\n    'lensmodel':  'LENSMODEL_OPENCV5',\n    'extrinsics': [ 0, 0, 0, 0, 0, 0 "
+                           "],\n    'intrinsics': [9001.8, 9000, 3007.5, 1999.5, -0.1, 0.05, 0.0001, 0.0002, "
+                           "0.01],\n    'imagersize': [ 6016, 4000 ]\n}\n"));
 }
 
 TEST(CameraExport, PhotoModelerValuesBecomeACamera) {

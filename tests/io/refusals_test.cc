@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 
+#include <csignal>
 #include <functional>
 #include <utility>
 #include <vector>
@@ -81,6 +83,7 @@ TEST(Refusals, OfYamlNameLineAndKey) {
        },
        "found 'text', wanted one of a, b"},
       {[&] { (void)map.text("wort"); }, "missing, wanted a text; 'word' in line 3 looks like it"},
+      {[&] { (void)map.number("nested"); }, "f.yaml:7: nested: found a mapping, wanted a number"},
       {[&] { map.map("nested").finish(); }, "unknown key 'nested.inner'"},
       {[] { (void)YamlMap::parse("[1, 2]: 3\n", "f.yaml").keys(); }, "f.yaml:1: a key is not a single value"},
       {[] { (void)YamlMap::parse(std::string(20 << 20, ' '), "f.yaml"); }, "bytes, wanted at most"},
@@ -138,6 +141,8 @@ TEST(Refusals, OfNominalPointsAndTheTableOfImages) {
   images.expect("a.jpg,", ",", "images.csv:2: column 'file': is empty, wanted a file name");
   images.expect(",home", ",", "images.csv:2: column 'pose': is empty, wanted a pose id");
   images.expect("file,pose", "file,file", "images.csv:1: column 'file' stands twice");
+  images.expect("a.jpg,home", std::string(2000, ','), "images.csv:2: no CSV table: more than 1000 fields");
+  images.expect("a.jpg", std::string(std::size_t{2} << 20, 'a'), "or one of more than 1048576 bytes");
 }
 
 TEST(Refusals, OfACameraFile) {
@@ -150,6 +155,11 @@ TEST(Refusals, OfACameraFile) {
   file.expect("[6016, 4000]", "[6016, 4000.5]",
               "image_size_px: found 4000.5, wanted whole numbers from 16 to 65535");
   file.expect("model: brown", "model: fisheye", "wanted one of brown, rational, radial");
+  const Eigen::Index count = camera.model.parameters.size();
+  camera.covariance = Eigen::MatrixXd::Identity(count, count);
+  const FaultyFile sigmas("sigmas.yaml", format_camera_file("", camera),
+                          [](const fs::path& path) { (void)read_camera_file(path); });
+  sigmas.expect("f_px: [1,", "f_px: [-1,", "covariance.f_px: variance -1 is negative");
 }
 
 TEST(Refusals, OfAnotherProgramsCamera) {
@@ -243,6 +253,17 @@ TEST(Refusals, OfPosesAndReadings) {
   poses.expect("\na,", "\n,", "poses.csv:2: column 'pose': is empty, wanted a pose id");
   poses.expect("a,10,0,0,0,2,0,", "a,,,,,,,",
                "poses.csv:2: column 'pose': pose 'a' has no coordinate, wanted at least one");
+  write_file_atomically(folder.path() / "failed.csv",
+                        "pose,status,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\na,ok,10,0,0,0,2,0\n"
+                        "b,no_photographs,,,,,,\nc,ok,0,0,10,0,0,2\n");
+  const ObservationFiles with_failed{.poses = folder.path() / "failed.csv",
+                                     .targets = targets,
+                                     .legs = std::nullopt,
+                                     .covariance = std::nullopt};
+  const ObservationTable table = read_observations(nominal, with_failed, {});
+  ASSERT_EQ(table.left_out.size(), 1U);
+  EXPECT_EQ(table.left_out[0].id, "b");
+  EXPECT_EQ(table.left_out[0].reason, "not measured: no_photographs");
   const auto scaled = [&](const char* mm, const char* deg, const std::string& words) {
     const fs::path path = folder.path() / "scaled.csv";
     write_file_atomically(
@@ -320,6 +341,45 @@ TEST(Refusals, OfRowsThatStreamThrough) {
   write_file_atomically(rows.path(), "pose,q1\na,1\n");
   EXPECT_THAT([&] { read(rows.path()); },
               ThrowsInputError("out.csv: is a folder, wanted a file name to write"));
+}
+
+TEST(Refusals, OfFilesThatCannotBeReadOrWritten) {
+  const TemporaryFolder folder;
+  write_file_atomically(folder.path() / "file", "pose,q1\na,1\n");
+  const fs::path inside = folder.path() / "file" / "out.csv";
+  EXPECT_THAT([&] { write_file_atomically(inside, ""); }, ThrowsInputError("file: cannot create: "));
+  RowTransform transform;
+  transform.columns = {"q1"};
+  transform.row = [](const StreamedRow&, std::string&) { return true; };
+  EXPECT_THAT([&] { (void)stream_rows(folder.path() / "file", inside, "#", transform, 1); },
+              ThrowsInputError("out.csv: cannot write: Not a directory"));
+  EXPECT_THAT([] { (void)read_file("/proc/self/mem"); },  // opens, and has nothing at address 0
+              ThrowsInputError("/proc/self/mem: cannot read: "));
+  fs::create_directory(folder.path() / "elsewhere");
+  fs::create_directory_symlink("elsewhere", folder.path() / "results");
+  EXPECT_THAT([&] { refuse_linked_folders(folder.path() / "results"); },
+              ThrowsInputError("results: is a link, wanted a folder"));
+}
+
+// As a full disk would answer, but for this process alone.
+TEST(Refusals, OfADiskThatIsFull) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "out.csv";
+  const auto before = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit unlimited{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &unlimited), 0);
+  const rlimit little{1000, unlimited.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &little), 0);
+  std::string said;
+  try {
+    write_file_atomically(path, std::string(2000, 'x'));
+  } catch (const InputError& error) {
+    said = error.what();
+  }
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &unlimited), 0);
+  std::signal(SIGXFSZ, before);
+  EXPECT_THAT(said, ::testing::HasSubstr("out.csv: cannot write: File too large"));
+  EXPECT_TRUE(fs::is_empty(folder.path())) << "half a file was left";
 }
 
 TEST(Refusals, OfAFileThatHoldsTooMuch) {

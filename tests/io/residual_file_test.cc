@@ -37,6 +37,25 @@ TEST(ResidualFile, HoldsEveryMarkerOfEveryPhotographAndReadsBack) {
   }
 }
 
+TEST(ResidualFile, SaysOfEachMarkerWhatBecameOfIt) {
+  MarkerObservation seen;
+  seen.status = MarkerStatus::cut_by_frame;
+  EXPECT_EQ(sighting_words(nullptr, seen), marker_status_name(seen.status));
+  const std::vector<std::pair<SightingStatus, std::string>> words{
+      {SightingStatus::used, "used"},
+      {SightingStatus::not_measured, marker_status_name(seen.status)},
+      {SightingStatus::unknown_id, "not of this campaign"},
+      {SightingStatus::repeated_id, "id twice"},
+      {SightingStatus::seen_once, "seen once"},
+      {SightingStatus::unoriented, "not connected"},
+      {SightingStatus::outlier, "contradicts the rest"}};
+  for (const auto& [status, wanted] : words) {
+    Sighting sighting;
+    sighting.status = status;
+    EXPECT_EQ(sighting_words(&sighting, seen), wanted);
+  }
+}
+
 TEST(ResidualFile, AWordInANumberColumnIsRefused) {
   const TemporaryFolder folder;
   const std::filesystem::path path = folder.path() / "residuals.csv";

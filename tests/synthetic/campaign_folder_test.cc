@@ -123,6 +123,10 @@ TEST_F(CampaignFolder, SecondRoundMovesTheSameMachine) {
   second.round = 1;
   second.targets = read_pose_table(folder_ / "a/targets.csv");
   second.commands = read_leg_table(folder_ / "a/legs.csv");
+  second.commands->erase(second.commands->begin() + 2);
+  EXPECT_THAT(write_campaign(folder_ / "c", again, second).skipped,
+              testing::ElementsAre("p002: not commanded"));
+  second.commands = read_leg_table(folder_ / "a/legs.csv");
   (*second.commands)[2].status = "out of stroke";
   const RoundResult result = write_campaign(folder_ / "b", again, second);
   EXPECT_THAT(result.skipped, testing::ElementsAre("p002: out of stroke"));

@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "kinematics/geometry/input_error.h"
+#include "tests/support/error_matchers.h"
 #include "tests/support/rigid_matchers.h"
 
 namespace hexcal {
@@ -88,10 +88,24 @@ TEST(VirtualMachine, SaysWhenALegLeavesItsStroke) {
   EXPECT_FALSE(true_pose(machine, far, machine.home_readings).has_value());
 }
 
-TEST(VirtualMachine, RefusesNegativeErrors) {
-  MachineErrors errors;
-  errors.joint_sigma_mm = -1;
-  EXPECT_THROW((void)make_machine(1, errors), InputError);
+TEST(VirtualMachine, RefusesWhatNoMachineCanBe) {
+  const auto refused = [](auto change, const char* words) {
+    MachineErrors errors;
+    change(errors);
+    EXPECT_THAT([&] { (void)make_machine(1, errors); }, ThrowsInputError(words));
+  };
+  refused([](MachineErrors& e) { e.joint_sigma_mm = -1; }, "joint_sigma_mm is -1, wanted 0 or more");
+  refused([](MachineErrors& e) { e.draws = 0; }, "draws is 0, wanted 1 or more");
+  refused([](MachineErrors& e) { e.leg_offset_sigma_mm = 1e5; },
+          "the machine errors are so large that the hexapod cannot be assembled at home");
+}
+
+TEST(VirtualMachine, SaysWhenNoPoseOfTheRangeCanBeReached) {
+  VirtualMachine machine = make_machine(1, {});
+  for (Actuator& actuator : machine.nominal.actuators) actuator.max_mm = actuator.min_mm;
+  EXPECT_EQ(random_targets(machine, 1, 0, 30, 12 * kRadPerDeg).size(), 1U);
+  EXPECT_THAT([&] { (void)random_targets(machine, 1, 1, 30, 12 * kRadPerDeg); },
+              ThrowsInputError("no reachable poses within +-30 mm and +-12 deg"));
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "kinematics/geometry/input_error.h"
+#include "tests/support/error_matchers.h"
 #include "tools/synthetic/grips.h"
 #include "tools/synthetic/lens_profile.h"
 #include "tools/synthetic/random_source.h"
@@ -236,6 +236,19 @@ TEST(Render, RefusesOptionsOutOfRange) {
   SensorOptions sensor;
   sensor.read_noise = -0.1;
   EXPECT_THROW(sensor.validate(), InputError);
+}
+
+TEST(Render, RefusesAMarkerALensAndASensorThatCannotBe) {
+  Sticker sticker;
+  sticker.id = 587;
+  sticker.size_mm = 24;
+  EXPECT_THAT([&] { (void)sticker_surface("tag36h11", sticker); },
+              ThrowsInputError("marker family tag36h11 has ids 0 to 586, wanted 587"));
+  CameraModel folded(640, 480, 600, LensModel::brown);
+  folded.parameters[CameraModel::kNumPinhole] = -5;  // its image turns back inside the frame
+  EXPECT_THAT([&] { (void)RayLattice(folded); }, ThrowsInputError("the lens has no inverse at pixel"));
+  expect_option_refused<SensorOptions>("full_well_electrons is -1, wanted 0 or more",
+                                       [](SensorOptions& options) { options.full_well_electrons = -1; });
 }
 
 }  // namespace

@@ -187,8 +187,8 @@ std::vector<TargetPose> random_targets(const VirtualMachine& machine, std::uint6
   RandomSource random(seed, 2);
   for (int attempt = 0; static_cast<int>(targets.size()) <= count; ++attempt) {
     if (attempt > 1000 * (count + 1)) {
-      throw InputError(
-          fmt::format("no reachable poses within +-{} mm and +-{} deg", range_mm, range_rad * kDegPerRad));
+      throw InputError(fmt::format("no reachable poses within +-{:g} mm and +-{:g} deg", range_mm,
+                                   range_rad * kDegPerRad));
     }
     const Pose pose = random_pose(random, range_mm, range_rad);
     const LegVector readings = commanded_readings(machine.nominal, pose);
