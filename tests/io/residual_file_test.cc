@@ -12,7 +12,11 @@ namespace hexcal {
 namespace {
 
 TEST(ResidualFile, HoldsEveryMarkerOfEveryPhotographAndReadsBack) {
-  const CampaignScene made = make_campaign_scene({});
+  CampaignScene made = make_campaign_scene({});
+  auto& markers = made.observations.photographs[1].seen.markers;
+  MarkerObservation stranger = markers.front();
+  stranger.id = 586;
+  markers.insert(markers.begin(), stranger);
   const CampaignResult result = extract_poses(made.campaign, made.observations);
   const TemporaryFolder folder;
   const std::filesystem::path path = folder.path() / "residuals.csv";
@@ -25,7 +29,10 @@ TEST(ResidualFile, HoldsEveryMarkerOfEveryPhotographAndReadsBack) {
     ASSERT_EQ(read.size(), photograph.markers.size());
     for (std::size_t m = 0; m < read.size(); ++m) {
       EXPECT_EQ(read[m].id, photograph.markers[m].id);
-      EXPECT_EQ(read[m].status, "used");
+      const bool known = read[m].id != stranger.id;
+      EXPECT_EQ(read[m].status, known ? "used" : "not of this campaign");
+      EXPECT_EQ(read[m].placed, known);
+      if (!known) continue;
       const std::size_t place = places.at({static_cast<int>(p), read[m].id});
       for (std::size_t c = 0; c < 4; ++c) {
         EXPECT_LT((read[m].corners_px[c] - photograph.markers[m].corners_px[c]).norm(), 1e-3);

@@ -1,9 +1,12 @@
 #include <fmt/format.h>
 
+#include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <opencv2/core/utils/logger.hpp>
+#include <system_error>
 
 #include "kinematics/geometry/input_error.h"
 #include "tools/hexcal/commands.h"
@@ -46,13 +49,21 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
     if (quiet && !wants_json(app)) hexcal::silence_words();
-    return action();
+    const int code = action();
+    if (std::fflush(stdout) != 0) throw std::system_error(errno, std::generic_category(), "standard output");
+    return code;
   } catch (const CLI::Success& done) {  // --help, --version
     return app.exit(done);
   } catch (const CLI::ParseError& error) {
     fmt::print(stderr, "hexcal: {} (see hexcal --help)\n", error.what());
     return hexcal::kInputError;
   } catch (const hexcal::InputError& error) {
+    fmt::print(stderr, "hexcal: {}\n", hexcal::one_line(error.what()));
+    return hexcal::kInputError;
+  } catch (const std::filesystem::filesystem_error& error) {  // a folder without permission, a name too long
+    fmt::print(stderr, "hexcal: {}: {}\n", hexcal::one_line(error.path1().string()), error.code().message());
+    return hexcal::kInputError;
+  } catch (const std::system_error& error) {  // a full disk behind standard output
     fmt::print(stderr, "hexcal: {}\n", hexcal::one_line(error.what()));
     return hexcal::kInputError;
   } catch (const std::exception& error) {

@@ -40,10 +40,11 @@ std::string sighting_words(const Sighting* sighting, const MarkerObservation& se
 std::map<std::pair<int, int>, std::size_t> sightings_by_id(const CampaignResult& result) {
   std::map<std::pair<int, int>, std::size_t> out;
   const std::vector<Sighting>& sightings = result.adjusted.sightings;
+  std::map<int, std::size_t> taken;  // by photograph: a sighting per marker, in their order
   for (std::size_t s = 0; s < sightings.size(); ++s) {
-    if (sightings[s].marker < 0) continue;
-    const int id = result.network.markers[static_cast<std::size_t>(sightings[s].marker)].id;
-    out.emplace(std::pair(sightings[s].photo, id), s);
+    const int photo = sightings[s].photo;
+    const auto& seen = result.network.photos[static_cast<std::size_t>(photo)].markers;
+    out.emplace(std::pair(photo, seen.at(taken[photo]++).id), s);
   }
   return out;
 }
