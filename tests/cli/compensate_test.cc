@@ -100,6 +100,14 @@ TEST_F(Compensate, RefusesInOneClearLine) {
   refused(good + "far,0,0,300,0,0,0\n", targets + "far,0,0,300,0,0,0\n", "wanted 380 to 580 mm");
 }
 
+// Turned towards the machine's singular pose, and far from what the others say.
+TEST_F(Compensate, NamesAnOutlierNearASingularPose) {
+  const CommandResult r =
+      run(table(1.5, 0.3) + "twist,31.5,1.5,1.5,0.3,0.3,75.3\n", table(0, 0) + "twist,0,0,0,0,0,75\n");
+  EXPECT_LE(r.exit_code, 1) << r.err;
+  EXPECT_THAT(r.out, HasSubstr("left out as near-singular outliers: twist\n"));
+}
+
 TEST_F(Compensate, ResultsGoToControllers) {
   (void)run(table(1.5, 0.3), table(0, 0));
   const auto in = [&](const char* name) { return (folder_.path() / "out" / name).string(); };
