@@ -1,6 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <functional>
+
 #include "tests/report/sample_report.h"
 #include "tests/report/well_formed.h"
 #include "tools/report/campaign_report.h"
@@ -99,6 +102,93 @@ TEST(CampaignReport, ALargeCampaignStaysSmall) {
   }
   report.network->photographs.assign(400, crowded);
   EXPECT_LT(render_page(campaign_page(report)).size(), 5'000'000U);
+}
+
+struct FaultyCampaign {
+  const char* name;
+  std::function<void(CampaignReport&)> change;
+  Light least;  ///< of the verdict
+  std::vector<std::string> findings, next_steps;
+};
+
+class CampaignFault : public ::testing::TestWithParam<FaultyCampaign> {};
+
+TEST_P(CampaignFault, IsSaidWithWhatToDo) {
+  CampaignReport report = sample_report();
+  GetParam().change(report);
+  const Verdict verdict = campaign_verdict(report);
+  EXPECT_GE(verdict.light, GetParam().least);
+  for (const std::string& words : GetParam().findings) {
+    EXPECT_THAT(verdict.findings, ::testing::Contains(HasSubstr(words)));
+    EXPECT_THAT(campaign_verdict(sample_report()).findings, Not(::testing::Contains(HasSubstr(words))));
+  }
+  for (const std::string& words : GetParam().next_steps)
+    EXPECT_THAT(verdict.next_steps, ::testing::Contains(words));
+}
+
+CrossValidation& chosen_of(CampaignReport& report) {
+  CalibrationReport& calibration = report.compensation->calibration;
+  return *std::ranges::find(calibration.comparison.methods, calibration.chosen, &CrossValidation::name);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Verdict, CampaignFault,
+    ::testing::Values(
+        FaultyCampaign{"residuals",
+                       [](CampaignReport& r) { r.network->sigma0 = 3; },
+                       Light::warning,
+                       {"Residuals are 3.0 times what the corners' own standard deviations promise (sigma0)"},
+                       {}},
+        FaultyCampaign{"no_better",
+                       [](CampaignReport& r) { chosen_of(r).errors.position_rms_mm = 1e3; },
+                       Light::bad,
+                       {"No method makes this machine better: do not use the commands."},
+                       {}},
+        FaultyCampaign{
+            "noise",
+            [](CampaignReport& r) { chosen_of(r).errors.position_rms_mm = 0.006; },
+            Light::warning,
+            {"What remains is about the noise of the measurement itself: the machine may be better"},
+            {}},
+        FaultyCampaign{
+            "left_out",
+            [](CampaignReport& r) {
+              r.compensation->calibration.outliers = {"pose_2"};
+              r.compensation->calibration.unexplained = {"pose_4", "pose_7"};
+            },
+            Light::warning,
+            {"Left out as near singular: pose_2.", "No model explains pose_4 and pose_7: measured"},
+            {"Photograph pose_4 and pose_7 again."}},
+        FaultyCampaign{"out_of_reach",
+                       [](CampaignReport& r) {
+                         r.commands = {{"pose_1", "ok", {}}, {"pose_8", "out_of_stroke", {}}};
+                       },
+                       Light::warning,
+                       {"1 pose cannot be reached after compensation: pose_8."},
+                       {}},
+        FaultyCampaign{"single",
+                       [](CampaignReport& r) { r.poses[0].images = 1; },
+                       Light::warning,
+                       {"pose_1 (a single photograph: nothing checks it)"},
+                       {}}),
+    [](const auto& one) { return one.param.name; });
+
+TEST(CampaignReport, PosesWithoutTargetsAskForThem) {
+  CampaignReport report = sample_report();
+  report.targets.clear();
+  EXPECT_THAT(render_page(campaign_page(report)),
+              HasSubstr("No pose has a target: name <code>targets</code> in campaign.yaml to see errors."));
+}
+
+TEST(CampaignReport, APhotographWithLargeResidualsNeedsALook) {
+  CampaignReport report = sample_report();
+  std::vector<PhotographPart>& photographs = report.network->photographs;
+  const PhotographPart clean = photographs[2];
+  const std::string words = "residuals more than 3 times the campaign";
+  photographs.insert(photographs.end(), 3, clean);
+  EXPECT_THAT(render_page(campaign_page(report)), Not(HasSubstr(words)));
+  photographs.back().rms_px *= 4;
+  EXPECT_THAT(render_page(campaign_page(report)), HasSubstr(words));
 }
 
 }  // namespace

@@ -9,7 +9,9 @@ namespace hexcal {
 namespace {
 
 using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 // The second round of a machine whose errors fell to a share of what they were.
 ComparisonReport two_rounds(double left) {
@@ -57,6 +59,31 @@ TEST(Comparison, ThePageHoldsTheTablesAndEveryFigureIsWellFormed) {
   EXPECT_FALSE(comparison_charts(report).empty());
   for (const Chart& chart : comparison_charts(report))
     EXPECT_THAT(chart_svg_file(chart), IsWellFormedXml()) << chart.id;
+}
+
+TEST(Comparison, APoseThatBecameWorseIsNamedThoughTheRestImproved) {
+  ComparisonReport report = two_rounds(0.01);
+  report.after.poses[0].pose = two_rounds(1.5).after.poses[0].pose;
+  const Verdict verdict = comparison_verdict(report);
+  EXPECT_EQ(verdict.light, Light::warning);
+  EXPECT_THAT(verdict.findings,
+              Contains("1 of 9 poses became worse, beyond the measurement's noise: pose_1."));
+}
+
+TEST(Comparison, ErrorsAsSmallAsTheNoiseNeedNoMoreCompensation) {
+  const std::string words =
+      "What remains is about the noise of the measurement itself: there is nothing left";
+  EXPECT_THAT(comparison_verdict(two_rounds(0.0001)).findings, Contains(HasSubstr(words)));
+  EXPECT_THAT(comparison_verdict(two_rounds(0.1)).findings, Not(Contains(HasSubstr(words))));
+}
+
+TEST(Comparison, ARoundThatWasNotMeasuredIsNamed) {
+  ComparisonReport report = two_rounds(0.5);
+  report.after.poses.clear();
+  const Verdict verdict = comparison_verdict(report);
+  EXPECT_EQ(verdict.light, Light::bad);
+  EXPECT_EQ(verdict.headline, "Nothing has been measured in round 2 yet.");
+  EXPECT_THAT(verdict.next_steps, ElementsAre("Run `hexcal measure` on round 2."));
 }
 
 }  // namespace

@@ -52,6 +52,7 @@ TEST(Page, VerdictSaysItsLightInWords) {
   EXPECT_THAT(verdict, HasSubstr("Not usable"));
   EXPECT_THAT(verdict, HasSubstr("<code>b</code> &amp; &lt;c&gt;"));
   EXPECT_THAT(verdict, IsWellFormedXml());
+  EXPECT_THAT(html_verdict({Light::none, "h", {}, {}}).source, HasSubstr("Not judged"));
 }
 
 TEST(Page, NeedsNoNetworkAndStaysSmall) {
