@@ -9,6 +9,7 @@
 #include "tests/report/well_formed.h"
 #include "tools/report/axis_ticks.h"
 #include "tools/report/markup.h"
+#include "tools/report/pdf_canvas.h"
 
 namespace hexcal {
 namespace {
@@ -115,6 +116,15 @@ TEST(Chart, EmptyOrHopelessDataStillDraw) {
   panel.cells = {{{0, 0}, {1, 1}, std::nan(""), ""}};
   chart.panels = {panel};
   EXPECT_THAT(chart_svg_file(chart), AllOf(IsWellFormedXml(), Not(HasSubstr("nan")), Not(HasSubstr("inf"))));
+}
+
+TEST(Chart, PdfThatCannotBeDrawnIsNoFile) {
+  PdfCanvas canvas({100, 100}, "title");
+  TextStyle style;
+  style.turn_deg = std::nan("");
+  canvas.text({10, 10}, "words", style);
+  EXPECT_THAT([&canvas] { (void)canvas.finish(); },
+              ::testing::ThrowsMessage<std::runtime_error>(HasSubstr("cairo: invalid matrix")));
 }
 
 TEST(Chart, PdfIsThereAndSameInputGivesSameBytes) {
