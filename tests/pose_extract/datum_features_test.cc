@@ -173,8 +173,7 @@ TEST(DatumFeatures, SayWhichFeatureIsTooWeakForAFrame) {
   const double steep = 10 * kRadPerDeg + 1e-8;
   adjusted.geometry.body_from_marker[0].translation =
       from.translation + from.rotation * Eigen::Vector3d(100 * std::sin(steep), 0, 100 * std::cos(steep));
-  expect("its features are too weak to construct it",
-         [](auto& f) { f.x.points = {{13, -1}, {0, -1}}; });
+  expect("its features are too weak to construct it", [](auto& f) { f.x.points = {{13, -1}, {0, -1}}; });
 }
 
 TEST(FeatureFit, WithoutASolutionSaysSo) {
@@ -205,8 +204,7 @@ TEST(DatumNominal, SaysWhyItsPointsMakeNoFrame) {
   ASSERT_EQ(adjusted.status, AdjustmentStatus::ok) << adjusted.reason;
   const auto expect = [&](const std::string& words, const std::vector<NominalPoint>& nominal) {
     for (const bool with_scale : {false, true}) {
-      const DatumFrame frame =
-          frame_from_nominal(scene.network, adjusted, Body::fixed, nominal, with_scale);
+      const DatumFrame frame = frame_from_nominal(scene.network, adjusted, Body::fixed, nominal, with_scale);
       EXPECT_EQ(frame.ok, words.empty()) << words;
       EXPECT_EQ(frame.reason, words);
     }
