@@ -168,7 +168,7 @@ class Identification {
           linearize_legs(result_.machine, nominal_, result_.layout, result_.stroke_range, filled_[i],
                          pose.readings, pose.approach);
       if (!legs.residuals_mm.allFinite() || !legs.jacobian.allFinite()) {
-        result_.reason = fmt::format("pose {}: the machine is singular there", pose.id);
+        result_.reason = fmt::format("pose {}: its legs have no finite lengths there", pose.id);
         return false;
       }
       reduced_.push_back(reduce_to_observed(legs, pose.observed, result_.selection));

@@ -40,6 +40,7 @@ void add_words(std::string& words, const std::string& more) {
 struct EpochEvidence {
   std::set<int> photos, markers;  // with used sightings of the moving body
   int moving_used = 0, moving_rejected = 0;
+  int moving_unplaced = 0;  // that contradict each other, or are connected with no other pose
   int fixed_used = 0;
   const Sighting* only = nullptr;  // the moving sighting when there is one
 };
@@ -58,6 +59,7 @@ EpochEvidence evidence_of(const CampaignResult& result, std::size_t epoch) {
     if (used && !moving) ++evidence.fixed_used;
     if (!moving) continue;
     if (sighting.status == SightingStatus::outlier) ++evidence.moving_rejected;
+    if (sighting.status == SightingStatus::unoriented) ++evidence.moving_unplaced;
     if (!used) continue;
     ++evidence.moving_used;
     evidence.photos.insert(sighting.photo);
@@ -140,6 +142,13 @@ void judge_pose(const Campaign& campaign, const ExtractOptions& options, const E
   if (pose.status != PoseStatus::ok) return;
   if (evidence.moving_used == 0 && evidence.moving_rejected == 0 && !geometry.has_epoch[epoch]) {
     const bool connected = evidence.fixed_used > 0;
+    if (connected && evidence.moving_unplaced > 0) {
+      pose.status = PoseStatus::disconnected;
+      add_words(pose.words,
+                "its markers of the moving grip fit no other pose: photographs of several poses, "
+                "markers that moved, or markers that no other pose shows");
+      return;
+    }
     pose.status = connected ? PoseStatus::no_moving_markers : PoseStatus::disconnected;
     add_words(pose.words, connected ? "no marker of the moving grip was measured"
                                     : "no fixed marker connects its photographs with the other poses");

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "calibration/compensation.h"
 #include "calibration/leg_residuals.h"
 #include "calibration/normal_equations.h"
 #include "kinematics/screw.h"
@@ -349,6 +350,47 @@ TEST(Identify, RefusesAParameterThatIsNone) {
   options.fixed.clear();
   options.leg_sigma_mm = 0;
   EXPECT_THAT([&] { options.validate(); }, ThrowsInputError("leg_sigma_mm"));
+  options.leg_sigma_mm = 1;
+  options.curve_terms = 13;
+  EXPECT_THAT([&] { options.validate(); }, ThrowsInputError("curve_terms: found 13, wanted 0 to 12"));
+}
+
+TEST(Identify, SaysWhyItFails) {
+  const PlatformGeometry nominal = surrogate_hexapod();
+  const ObservationSet good =
+      measured(as_built(nominal, {}, 3), nominal, random_poses(12, {}, 9), {0.01, 0.005, 4});
+  const auto expect = [&](const std::string& reason, const IdentifyOptions& options, auto change) {
+    ObservationSet set = good;
+    change(set.poses);
+    const IdentifyResult result = identify(nominal, set, options);
+    EXPECT_EQ(result.status, IdentifyStatus::failed) << reason;
+    EXPECT_EQ(result.reason, reason);
+  };
+  IdentifyOptions unknown_frames;
+  unknown_frames.frames_unknown = true;
+  const std::string no_frames = "the frames of the measured poses cannot be aligned with the hexapod's";
+  expect(no_frames, unknown_frames, [](auto& poses) { poses.resize(2); });
+  expect(no_frames, unknown_frames, [](auto& poses) {  // metres
+    for (PoseObservation& pose : poses) pose.readings /= 1000;
+  });
+  expect("pose p3: its legs have no finite lengths there", {},
+         [](auto& poses) { poses[2].measured.position_mm.x() = 1e200; });
+  expect("the equations have no finite solution", {}, [](auto& poses) { poses[2].readings[0] = 1e200; });
+  IdentifyOptions hasty;
+  hasty.max_iterations = 1;
+  expect("no convergence in 1 iterations", hasty, [](auto&) {});
+}
+
+TEST(Compensate, ATargetBeyondAllNumbersIsNotTaken) {
+  CalibrationModel model{.method = CompensationMethod::kinematic, .nominal = surrogate_hexapod()};
+  model.machine.geometry = surrogate_hexapod();
+  const std::vector<CorrectedCommand> commands =
+      compensate(model, {{"near", {}}, {"far", Pose{{1e200, 0, 0}, {0, 0, 0}}}});
+  ASSERT_EQ(commands.size(), 2U);
+  EXPECT_EQ(commands[0].status, CommandStatus::ok) << commands[0].reason;
+  EXPECT_EQ(commands[1].status, CommandStatus::no_pose);
+  EXPECT_EQ(commands[1].reason, "the identified machine cannot take this pose");
+  EXPECT_FALSE(commands[1].readings);
 }
 
 }  // namespace

@@ -1,8 +1,12 @@
 #include "pose_extract/extract_poses.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 #include "kinematics/geometry/input_error.h"
+#include "pose_extract/pose_verdict.h"
 #include "tests/support/campaign_scene.h"
 #include "tests/support/error_matchers.h"
 
@@ -10,6 +14,7 @@ namespace hexcal {
 namespace {
 
 using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -33,6 +38,20 @@ class ExtractPoses : public ::testing::Test {
   }
   PhotographObservations& seen(const std::string& pose, std::size_t index) {
     return made_.observations.photographs[photographs_of(pose).at(index)].seen;
+  }
+  // The moving markers of a photograph as they would be seen in another pose.
+  void show_moving_markers_of(std::size_t epoch, const std::string& pose, std::size_t index) {
+    const std::size_t p = photographs_of(pose).at(index);
+    const ObservationScene& scene = made_.scene;
+    for (MarkerObservation& marker : made_.observations.photographs[p].seen.markers) {
+      if (marker.id < 100) continue;
+      Vector8d px;
+      ASSERT_TRUE(
+          project_marker({scene.true_camera, scene.camera_from_fixed[p], &scene.fixed_from_moving[epoch],
+                          scene.body_from_marker[static_cast<std::size_t>(marker.id) - 90]},
+                         24, 0, SquareShape::Zero(), px, nullptr));
+      for (int c = 0; c < 4; ++c) marker.corners_px[static_cast<std::size_t>(c)] = px.segment<2>(2 * c);
+    }
   }
   CampaignResult extract() {
     CampaignResult result = extract_poses(made_.campaign, made_.observations);
@@ -348,6 +367,113 @@ TEST_F(ExtractPoses, ResidualsFarBeyondTheirPromiseAreSaidInEveryPose) {
   const CampaignResult result = extract();
   EXPECT_THAT(result.warnings, Contains(HasSubstr("times what the photographs promise")));
   EXPECT_THAT(pose(result, "p01").words, HasSubstr("residuals are too large"));
+}
+
+TEST_F(ExtractPoses, WithoutAMeasuredBarTheScaleIsThatOfTheMarkers) {
+  made_.campaign.scale = ScaleFrom::bars;
+  made_.campaign.bars = {{{0, -1}, {4, -1}, 90, 0.002}};
+  for (CampaignPhotograph& photograph : made_.observations.photographs)
+    std::erase_if(photograph.seen.markers, [](const MarkerObservation& m) { return m.id == 4; });
+  const CampaignResult result = extract();
+  expect_others_ok(result, "");
+  EXPECT_THAT(result.warnings,
+              Contains("no scale bar was measured: the scale is that of the markers' sizes"));
+  EXPECT_FALSE(result.bars.at(0).measured);
+}
+
+TEST_F(ExtractPoses, PhotographsOfThreePosesInOneFitNone) {
+  show_moving_markers_of(3, "p02", 1);
+  show_moving_markers_of(4, "p02", 2);
+  const CampaignResult result = extract();
+  expect_others_ok(result, "p02");
+  EXPECT_EQ(pose(result, "p02").status, PoseStatus::disconnected);
+  EXPECT_THAT(pose(result, "p02").words, HasSubstr("its markers of the moving grip fit no other pose"));
+  EXPECT_FALSE(pose(result, "p02").pose);
+}
+
+TEST_F(ExtractPoses, APoseInWhichMostMovingMarkersMovedContradicts) {
+  for (const std::size_t p : photographs_of("p02")) {
+    for (MarkerObservation& marker : made_.observations.photographs[p].seen.markers) {
+      if (marker.id < 104) continue;
+      const double way = marker.id - 104;
+      const Rigid3 moved = made_.scene.body_from_marker[static_cast<std::size_t>(marker.id) - 90] *
+                           Rigid3::from_translation({std::cos(way), std::sin(way), 0});
+      Vector8d px;
+      ASSERT_TRUE(project_marker({made_.scene.true_camera, made_.scene.camera_from_fixed[p],
+                                  &made_.scene.fixed_from_moving[2], moved},
+                                 24, 0, SquareShape::Zero(), px, nullptr));
+      for (int c = 0; c < 4; ++c) marker.corners_px[static_cast<std::size_t>(c)] = px.segment<2>(2 * c);
+    }
+  }
+  const CampaignResult result = extract();
+  expect_others_ok(result, "p02");
+  EXPECT_EQ(pose(result, "p02").status, PoseStatus::contradictory) << pose(result, "p02").words;
+  EXPECT_THAT(pose(result, "p02").words, HasSubstr("sightings of moving markers contradict the rest"));
+  EXPECT_FALSE(pose(result, "p02").pose);
+}
+
+TEST_F(ExtractPoses, APhotographMostOfWhoseMarkersContradictIsNamed) {
+  show_moving_markers_of(3, "p02", 1);
+  std::erase_if(seen("p02", 1).markers, [](const MarkerObservation& m) { return m.id > 3 && m.id < 100; });
+  const CampaignResult result = extract();
+  expect_others_ok(result, "");
+  const MeasuredPhotograph& photograph = result.photographs[photographs_of("p02")[1]];
+  EXPECT_EQ(photograph.status, PhotoStatus::disagrees);
+  EXPECT_THAT(photograph.words, HasSubstr("markers contradict the other photographs"));
+  EXPECT_THAT(pose(result, "p02").words, HasSubstr(photograph.words));
+  EXPECT_EQ(pose(result, "p02").images, 2);
+}
+
+TEST_F(ExtractPoses, OneBlurredMarkerInOnePhotographIsAmbiguous) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    std::erase_if(seen("p02", i).markers,
+                  [i](const MarkerObservation& m) { return i == 0 ? m.id > 102 : m.id >= 100; });
+  }
+  std::erase_if(seen("p02", 0).markers,
+                [](const MarkerObservation& m) { return m.id >= 100 && m.id != 102; });
+  ASSERT_EQ(seen("p02", 0).markers.back().id, 102);
+  seen("p02", 0).markers.back().covariance_px2 *= 1e6;
+  const CampaignResult result = extract();
+  expect_others_ok(result, "p02");
+  EXPECT_EQ(pose(result, "p02").status, PoseStatus::ambiguous) << pose(result, "p02").words;
+  EXPECT_THAT(pose(result, "p02").words, HasSubstr("its flipped pose fits as well"));
+  EXPECT_FALSE(pose(result, "p02").pose);
+}
+
+TEST_F(ExtractPoses, ACameraThatIsNotAsCalibratedIsSaid) {
+  ObservationSceneOptions options;
+  options.num_epochs = 5;
+  options.noise_px = 0.01;
+  options.interior_sigma = 1;
+  made_ = make_campaign_scene(options);
+  made_.observations.cameras[0].model.parameters[0] += 20;
+  const CampaignResult result = extract_poses(made_.campaign, made_.observations);
+  EXPECT_THAT(result.warnings, Contains(HasSubstr("the camera is not as it was calibrated")));
+  expect_others_ok(result, "");
+}
+
+TEST(SwappedFolders, AreNamedOnlyWhereEachLiesAtTheOthersTarget) {
+  const std::vector<std::optional<Pose>> targets{Pose{}, Pose{{20, 0, 0}, {0, 0, 0}},
+                                                 Pose{{0, 30, 0}, {0, 0.1, 0}}};
+  const auto judged = [&](const std::vector<std::optional<Pose>>& measured) {
+    CampaignResult result;
+    for (std::size_t i = 0; i < measured.size(); ++i) {
+      MeasuredPose pose;
+      pose.id = fmt::format("p{}", i);
+      pose.pose = measured[i];
+      result.poses.push_back(pose);
+    }
+    judge_swapped_folders(targets, result);
+    return result;
+  };
+  const CampaignResult swapped = judged({Pose{{1, 1, 0}, {0, 0, 0}}, targets[2], targets[1]});
+  EXPECT_THAT(swapped.warnings,
+              ElementsAre("p1 and p2 look swapped: each lies where the other was commanded to"));
+  EXPECT_EQ(swapped.poses[0].words, "");
+  EXPECT_EQ(swapped.poses[1].words, "swapped with p2?");
+  EXPECT_EQ(swapped.poses[2].words, "swapped with p1?");
+  EXPECT_TRUE(judged(targets).warnings.empty());
+  EXPECT_TRUE(judged({Pose{}, targets[2], std::nullopt}).warnings.empty());
 }
 
 TEST_F(ExtractPoses, OnlyFixedMarkersIsAPlainPhotogrammetryProject) {
