@@ -21,6 +21,7 @@ constexpr double kUndetermined = 1e-13;  // of unit-diagonal normal equations: b
 // Inverse of normal equations. Combinations of parameters that nothing determines get a very large variance
 // instead of one of any size and sign that rounding makes.
 Eigen::MatrixXd symmetric_inverse(const Eigen::MatrixXd& m) {
+  if (m.rows() == 0) return m;  // a single marker carries the frame and leaves nothing to be determined
   const Eigen::VectorXd scale = m.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * m * scale.asDiagonal();
   const Eigen::LDLT<Eigen::MatrixXd> ldlt(scaled);

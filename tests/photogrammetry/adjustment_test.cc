@@ -302,6 +302,37 @@ TEST(Adjustment, RefusesWhenNothingIsConnected) {
   EXPECT_FALSE(result.reason.empty());
 }
 
+TEST(Adjustment, ASingleMarkerInTwoPhotographsIsEnoughUnlessItsShapeIsFree) {
+  ObservationSceneOptions options;
+  options.noise_px = 0.01;
+  options.num_epochs = 1;
+  options.stations = 2;
+  for (const bool calibrated : {false, true}) {
+    options.interior_sigma = calibrated ? 1 : 0;
+    ObservationScene scene = make_observation_scene(options);
+    for (NetworkPhoto& photo : scene.network.photos)
+      std::erase_if(photo.markers, [](const MarkerObservation& m) { return m.id != 2; });
+    for (const auto interior : {AdjustmentOptions::Interior::refined, AdjustmentOptions::Interior::fixed}) {
+      AdjustmentOptions how;
+      how.interior = interior;
+      const AdjustmentResult result = adjust_network(scene.network, how);
+      EXPECT_EQ(result.status, AdjustmentStatus::ok) << result.reason;
+      EXPECT_NEAR(result.redundancy_total, 4, 0.1);  // 16 coordinates, 12 of the cameras
+    }
+  }
+  options.interior_sigma = 0;
+  ObservationScene scene = make_observation_scene(options);
+  for (NetworkPhoto& photo : scene.network.photos)
+    std::erase_if(photo.markers, [](const MarkerObservation& m) { return m.id != 2; });
+  scene.network.photos[0].markers.at(0).corners_px[1] += Eigen::Vector2d(30, 10);
+  AdjustmentOptions free_shape;
+  free_shape.shape = AdjustmentOptions::Shape::free;
+  const AdjustmentResult result = adjust_network(scene.network, free_shape);
+  EXPECT_EQ(result.status, AdjustmentStatus::no_redundancy);
+  EXPECT_EQ(result.reason, "there are no more observations than unknowns, so nothing checks the result");
+  EXPECT_LT(result.redundancy_total, 1);
+}
+
 TEST(Adjustment, AChangedCameraLoosensThePrior) {
   ObservationSceneOptions options;
   options.noise_px = 0.01;

@@ -115,6 +115,32 @@ TEST(DecodedPhotographs, OfOtherKindsOrWithoutAPictureAreUnreadable) {
          "no image of 8 or 16 bit that can be decoded");
 }
 
+TEST(DecodedPhotographs, AJpegOfThousandsOfScansIsGivenUp) {
+  std::vector<unsigned char> encoded;
+  ASSERT_TRUE(cv::imencode(".jpg", cv::Mat(48, 64, CV_8UC1, cv::Scalar(128)), encoded,
+                           {cv::IMWRITE_JPEG_PROGRESSIVE, 1}));
+  const std::string jpeg(encoded.begin(), encoded.end());
+  ASSERT_EQ(decode_jpeg_luma(jpeg).status, PhotographStatus::ok) << decode_jpeg_luma(jpeg).reason;
+  const std::size_t last_scan = jpeg.rfind("\xFF\xDA");
+  const std::size_t end = jpeg.rfind("\xFF\xD9");
+  ASSERT_LT(last_scan, end);
+  std::string many = jpeg.substr(0, end);
+  for (int i = 0; i < 2000; ++i) many += jpeg.substr(last_scan, end - last_scan);
+  const DecodedImage image = decode_jpeg_luma(many + jpeg.substr(end));
+  EXPECT_NE(image.status, PhotographStatus::ok);
+  EXPECT_EQ(image.reason, "more than 100 scans");
+}
+
+TEST(DecodedPhotographs, AFileThatEndsBeforeItsSizeCannotBeRead) {
+  // The kernel states a page for each of its files, and gives less.
+  const std::filesystem::path path = "/sys/devices/system/cpu/online";
+  std::error_code error;
+  if (std::filesystem::file_size(path, error) != 4096 || error) GTEST_SKIP() << "without " << path;
+  const Photograph photograph = read_photograph(path);
+  EXPECT_EQ(photograph.status, PhotographStatus::unreadable);
+  EXPECT_EQ(photograph.reason, "cannot be read");
+}
+
 TEST(DecodedPhotographs, OfAnotherSizeThanTheCamerasAreRefused) {
   const TemporaryFolder folder;
   const std::filesystem::path path = folder.path() / "small.png";
