@@ -93,18 +93,10 @@ class Identification {
     result_.stroke_range = stroke_range_of(nominal, observations);
   }
 
-  // Begins where another identification with the same nominal machine and options ended.
-  void begin_at(const IdentifyResult& start) {
-    started_ = true;
-    nominal_.geometry.B_from_UG = start.machine.geometry.B_from_UG;
-    nominal_.geometry.P_from_LG = start.machine.geometry.P_from_LG;
-    result_.corrections = start.corrections;
-    result_.tolerances = start.tolerances;
-    noise_.leg_sigma_mm = start.leg_sigma_mm;
-  }
-
-  IdentifyResult run() {
-    if (options_.frames_unknown && !started_) {
+  IdentifyResult run(const IdentifyResult* start) {
+    if (start != nullptr) {
+      begin_at(*start);
+    } else if (options_.frames_unknown) {
       const auto frames = align_frames(nominal_.geometry, observations_);
       if (!frames) {
         result_.reason = "the frames of the measured poses cannot be aligned with the hexapod's";
@@ -157,6 +149,15 @@ class Identification {
 
  private:
   int free_count() const { return result_.selection.free_count; }
+
+  // Begins where another identification with the same nominal machine and options ended.
+  void begin_at(const IdentifyResult& start) {
+    nominal_.geometry.B_from_UG = start.machine.geometry.B_from_UG;
+    nominal_.geometry.P_from_LG = start.machine.geometry.P_from_LG;
+    result_.corrections = start.corrections;
+    result_.tolerances = start.tolerances;
+    noise_.leg_sigma_mm = start.leg_sigma_mm;
+  }
 
   bool linearize() {
     result_.machine = corrected_machine(nominal_, result_.layout, result_.corrections, result_.stroke_range);
@@ -368,7 +369,6 @@ class Identification {
   double step_squares_ = kInfinity;
   double hyper_change_ = 0;
   bool adapt_tolerances_ = false;
-  bool started_ = false;
 };
 
 }  // namespace
@@ -381,9 +381,7 @@ IdentifyResult identify(const PlatformGeometry& nominal, const ObservationSet& o
     refused.reason = std::move(why);
     return refused;
   }
-  Identification identification(nominal, observations, options);
-  if (start != nullptr) identification.begin_at(*start);
-  return identification.run();
+  return Identification(nominal, observations, options).run(start);
 }
 
 }  // namespace hexcal

@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include "kinematics/geometry/input_error.h"
 #include "kinematics/screw.h"
 #include "tests/support/hexapods.h"
 
