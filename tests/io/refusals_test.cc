@@ -179,7 +179,8 @@ TEST(Refusals, OfAnotherProgramsCamera) {
                                 "15.4], k: [0, 0, 0], p: [0, 0]}\n",
                                 read);
   photomodeler.expect("focal_mm: 35", "focal_mm: 0", "photomodeler: wanted positive focal_mm and format_mm");
-  photomodeler.expect("k: [0, 0, 0]", "k: [1, 1, 1]", "no Brown camera has these values");
+  photomodeler.expect("k: [0, 0, 0]", "k: [1, 1, 1]", "k and p move a point of the frame by");
+  photomodeler.expect("k: [0, 0, 0]", "k: [-4.0e-3, 0, 0]", "no Brown camera has these values");
 }
 
 TEST(Refusals, OfASheet) {
@@ -188,7 +189,7 @@ TEST(Refusals, OfASheet) {
       [](const fs::path& path) { (void)read_sheet_file(path); });
   sheet.expect("columns: 4", "columns: 0", "columns: found 0, wanted at least 1");
   sheet.expect("0-3", "0-x", "ids: found '0-x', wanted an id or a range such as 0-9");
-  sheet.expect("0-3", "3-0", "ids: range '3-0' runs backwards");
+  sheet.expect("0-3", "3-0", "ids: found '3-0', wanted an id or a range such as 0-9");
   sheet.expect("size_mm: 24", "size_mm: 0", "size_mm: found 0, wanted more than 0 mm");
   sheet.expect("tag36h11", "tag0h0", "marker family 'tag0h0' is not known; wanted one of");
   sheet.expect("0-3", "0-3, 2", "id 2 stands twice, wanted each id once");

@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <charconv>
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 
@@ -11,6 +11,7 @@
 #include "tools/hexcal/terminal.h"
 #include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/scalar_text.h"
 #include "tools/io/sheet_file.h"
 #include "tools/io/template_pdf.h"
 
@@ -46,23 +47,14 @@ Without --columns and --rows the page is filled. Print at 100 %, measure both ru
 
 std::vector<int> parse_ids(const std::string& text) {
   std::vector<int> ids;
-  const auto fail = [&text]() {
-    throw InputError(fmt::format("--ids: found '{}', wanted ids and ranges such as 0-9,100-109", text));
-  };
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  while (at < end) {
-    int first = 0;
-    auto parsed = std::from_chars(at, end, first);
-    if (parsed.ec != std::errc() || first < 0) fail();
-    int last = first;
-    if (parsed.ptr < end && *parsed.ptr == '-') {
-      parsed = std::from_chars(parsed.ptr + 1, end, last);
-      if (parsed.ec != std::errc() || last < first || last - first > 100000) fail();
+  for (std::string_view rest = text; !rest.empty();) {
+    const std::size_t comma = std::min(rest.find(','), rest.size());
+    const auto range = id_range_from_text(rest.substr(0, comma));
+    rest.remove_prefix(std::min(comma + 1, rest.size()));
+    if (!range) {
+      throw InputError(fmt::format("--ids: found '{}', wanted ids and ranges such as 0-9,100-109", text));
     }
-    for (int id = first; id <= last; ++id) ids.push_back(id);
-    at = parsed.ptr;
-    if (at < end && *at++ != ',') fail();
+    for (int id = range->first; id <= range->last; ++id) ids.push_back(id);
   }
   return ids;
 }

@@ -88,6 +88,13 @@ ForeignCamera read_photomodeler(const YamlMap& map) {
       const double radial = r2 * (k[0] + r2 * (k[1] + r2 * k[2]));
       const double xc = x + x * radial + p[0] * (r2 + 2 * x * x) + 2 * p[1] * x * y;
       const double yc = y + y * radial + p[1] * (r2 + 2 * y * y) + 2 * p[0] * x * y;
+      const double moved = std::hypot(xc - x, yc - y);
+      if (!(moved < 0.5 * std::hypot(format[0], format[1]))) {
+        map.fail("photomodeler",
+                 fmt::format("k and p move a point of the frame by {:.3g} mm, wanted less than half "
+                             "its diagonal",
+                             moved));
+      }
       rays.push_back({{xc / focal, -yc / focal}, px});
     }
   }

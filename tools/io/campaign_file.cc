@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <set>
 
 #include "kinematics/geometry/input_error.h"
 #include "tools/io/csv_table.h"
+#include "tools/io/scalar_text.h"
 #include "tools/io/yaml_map.h"
 
 namespace hexcal {
@@ -15,24 +15,15 @@ namespace {
 
 // Sigma of nominal coordinates that state none: a good coordinate measuring machine's.
 constexpr double kNominalSigmaMm = 0.01;
-constexpr int kMaxId = 1'000'000;
-
-std::optional<int> parse_id(std::string_view text) {
-  int value = 0;
-  const auto [rest, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || rest != text.data() + text.size() || value < 0 || value > kMaxId)
-    return std::nullopt;
-  return value;
-}
 
 // `9` or `9.2`.
 MarkerPoint parse_point(const YamlMap& map, const std::string& key, const std::string& text) {
   const auto dot = text.find('.');
-  const auto id = parse_id(std::string_view(text).substr(0, dot));
+  const auto id = id_from_text(std::string_view(text).substr(0, dot));
   MarkerPoint point{id.value_or(-1), -1};
   bool good = id.has_value();
   if (good && dot != std::string::npos) {
-    const auto corner = parse_id(std::string_view(text).substr(dot + 1));
+    const auto corner = id_from_text(std::string_view(text).substr(dot + 1));
     good = corner && *corner <= 3;
     point.corner = corner.value_or(-1);
   }
@@ -55,13 +46,9 @@ double not_negative(const YamlMap& map, const std::string& key, double fallback)
 
 void add_range(const YamlMap& map, const std::string& key, const std::string& text, double size_mm,
                MarkerSizes& sizes) {
-  const auto dash = text.find('-');
-  const auto first = parse_id(std::string_view(text).substr(0, dash));
-  const auto last = dash == std::string::npos ? first : parse_id(std::string_view(text).substr(dash + 1));
-  if (!first || !last || *last < *first) {
-    map.fail(key, fmt::format("found '{}', wanted an id or a range such as 0-9", text));
-  }
-  for (int id = *first; id <= *last; ++id) {
+  const auto range = id_range_from_text(text);
+  if (!range) map.fail(key, fmt::format("found '{}', wanted an id or a range such as 0-9", text));
+  for (int id = range->first; id <= range->last; ++id) {
     if (!sizes.emplace(id, size_mm).second) map.fail(key, fmt::format("marker {} stands twice", id));
   }
 }

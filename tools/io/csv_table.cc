@@ -4,11 +4,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 
 #include "kinematics/geometry/input_error.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/scalar_text.h"
 
 namespace hexcal {
 namespace {
@@ -16,13 +15,6 @@ namespace {
 // Far beyond any table of ours; a file without commas or line breaks is something else.
 constexpr std::size_t kMaxColumns = 1000;
 constexpr std::size_t kMaxFieldBytes = std::size_t{1} << 20;
-
-std::string trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t");
-  if (first == std::string_view::npos) return {};
-  const auto last = text.find_last_not_of(" \t");
-  return std::string(text.substr(first, last - first + 1));
-}
 
 // Takes one record off `text`, which may span lines inside quotes; counts the lines it took. Stops early at
 // a field or a number of fields that no table has.
@@ -34,7 +26,7 @@ std::vector<std::string> take_record(std::string_view& text, int& lines) {
   std::size_t i = 0;
   lines = 1;
   const auto finish_field = [&] {
-    fields.push_back(was_quoted ? field : trimmed(field));
+    fields.push_back(was_quoted ? field : std::string(trimmed(field)));
     field.clear();
     was_quoted = false;
   };
@@ -66,16 +58,6 @@ std::vector<std::string> take_record(std::string_view& text, int& lines) {
   return fields;
 }
 
-std::optional<double> parse_number(const std::string& text) {
-  double value = 0;
-  const char* begin = text.data();
-  const char* end = begin + text.size();
-  if (begin != end && *begin == '+') ++begin;
-  const auto [rest, error] = std::from_chars(begin, end, value);
-  if (error != std::errc() || rest != end || !std::isfinite(value)) return std::nullopt;
-  return value;
-}
-
 }  // namespace
 
 CsvTable CsvTable::parse(std::string_view text, const std::filesystem::path& path) {
@@ -86,11 +68,9 @@ CsvTable CsvTable::parse(std::string_view text, const std::filesystem::path& pat
   while (!text.empty()) {
     const std::size_t end = text.find('\n');
     const std::string_view first_line = text.substr(0, end);
-    const std::string head = trimmed(first_line);
-    if (head.empty() || head == "\r" || head[0] == '#') {
-      if (!head.empty() && head[0] == '#') {
-        table.comments_.push_back(head.back() == '\r' ? head.substr(0, head.size() - 1) : head);
-      }
+    const std::string_view head = trimmed(first_line);
+    if (head.empty() || head[0] == '#') {
+      if (!head.empty()) table.comments_.emplace_back(head);
       text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
       ++line;
       continue;
@@ -153,7 +133,7 @@ void CsvTable::fail(std::size_t row, std::string_view column, const std::string&
 
 double CsvTable::number(std::size_t row, std::string_view column) const {
   const std::string& field = text(row, column);
-  const auto value = parse_number(field);
+  const auto value = number_from_text(field);
   if (!value) fail(row, column, fmt::format("'{}' is not a number", field));
   return *value;
 }

@@ -2,19 +2,18 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <openssl/evp.h>
 #include <unistd.h>
 
 #include <array>
 #include <charconv>
-#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <future>
-#include <memory>
 
 #include "kinematics/geometry/input_error.h"
+#include "photogrammetry/photograph/sha256.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/scalar_text.h"
 
 namespace hexcal {
 namespace {
@@ -23,31 +22,6 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kBlock = std::size_t{1} << 22;
 constexpr std::size_t kLongestLine = std::size_t{1} << 20;
-
-std::string hash_of_file(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  const std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)> context(EVP_MD_CTX_new(), EVP_MD_CTX_free);
-  std::vector<char> buffer(kBlock);
-  bool good = context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1;
-  while (good && in) {
-    in.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
-    good = EVP_DigestUpdate(context.get(), buffer.data(), static_cast<std::size_t>(in.gcount())) == 1;
-  }
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-  unsigned int length = 0;
-  if (!good || EVP_DigestFinal_ex(context.get(), digest.data(), &length) != 1)
-    throw std::runtime_error("SHA-256 is not available");
-  std::string hex;
-  for (unsigned int i = 0; i < length; ++i) hex += fmt::format("{:02x}", digest[i]);
-  return hex;
-}
-
-std::string_view trimmed(std::string_view text) {
-  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
-  while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r'))
-    text.remove_suffix(1);
-  return text;
-}
 
 // Splits a line at its commas; quoted fields may hold commas. Quotes are taken off, doubled ones within are
 // kept in `unquoted` storage.
@@ -139,13 +113,13 @@ Piece transformed(std::string_view text, std::size_t first_line, const fs::path&
                                    fields.size(), layout.fields));
     }
     for (std::size_t k = 0; k < numbers.size(); ++k) {
-      std::string_view field = trimmed(fields[layout.numbers[k]]);
-      if (field.size() > 1 && field.front() == '+') field.remove_prefix(1);
-      const auto [stop, error] = std::from_chars(field.data(), field.data() + field.size(), numbers[k]);
-      if (error != std::errc() || stop != field.data() + field.size() || !std::isfinite(numbers[k])) {
+      const std::string_view field = trimmed(fields[layout.numbers[k]]);
+      const auto number = number_from_text(field);
+      if (!number) {
         throw InputError(fmt::format("{}:{}: {}: found '{}', wanted a number", path.string(), line,
                                      transform.columns[k], field));
       }
+      numbers[k] = *number;
     }
     const std::string_view id = fields[layout.id];
     if (id.empty())
@@ -227,8 +201,9 @@ StreamTally stream_rows(const fs::path& input, const fs::path& output, const std
   std::ifstream in(input, std::ios::binary);
   if (!in) throw InputError(fmt::format("{}: cannot read: {}", input.string(), std::strerror(errno)));
   PendingFile out(output);
-  out.write(fmt::format("{}  {} sha256:{}\n{}", head, one_line(input.filename().string()),
-                        hash_of_file(input), transform.header));
+  std::ifstream whole(input, std::ios::binary);
+  out.write(fmt::format("{}  {} sha256:{}\n{}", head, one_line(input.filename().string()), sha256_hex(whole),
+                        transform.header));
 
   std::size_t line = 1;
   std::string name;

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <charconv>
 #include <set>
 
 #include "kinematics/geometry/input_error.h"
 #include "photogrammetry/markers/marker.h"
+#include "tools/io/scalar_text.h"
 #include "tools/io/yaml_map.h"
 
 namespace hexcal {
@@ -25,23 +25,12 @@ int positive(const YamlMap& map, const std::string& key) {
   return value;
 }
 
-int id_number(const YamlMap& map, const std::string& key, const std::string& text, const std::string& whole) {
-  int value = -1;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || error != std::errc() || end != text.data() + text.size() || value < 0) {
-    map.fail(key, fmt::format("found '{}', wanted an id or a range such as 0-9", whole));
-  }
-  return value;
-}
-
 std::vector<int> read_ids(const YamlMap& map, const std::string& key) {
   std::vector<int> ids;
   for (const std::string& item : map.texts(key)) {
-    const std::size_t dash = item.find('-');
-    const int first = id_number(map, key, item.substr(0, dash), item);
-    const int last = dash == std::string::npos ? first : id_number(map, key, item.substr(dash + 1), item);
-    if (last < first || last - first > 100000) map.fail(key, fmt::format("range '{}' runs backwards", item));
-    for (int id = first; id <= last; ++id) ids.push_back(id);
+    const auto range = id_range_from_text(item);
+    if (!range) map.fail(key, fmt::format("found '{}', wanted an id or a range such as 0-9", item));
+    for (int id = range->first; id <= range->last; ++id) ids.push_back(id);
   }
   return ids;
 }

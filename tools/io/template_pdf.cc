@@ -6,12 +6,12 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <memory>
 
 #include "kinematics/geometry/input_error.h"
 #include "photogrammetry/markers/marker.h"
+#include "tools/io/scalar_text.h"
 #include "tools/io/template_drawing.h"
 
 namespace hexcal {
@@ -20,13 +20,6 @@ namespace {
 constexpr double kPointsPerMm = 72.0 / 25.4;
 constexpr double kStripMm = 9;  // of a ruler with its label
 constexpr double kTextMm = 4;   // of the text line
-
-std::optional<double> number(std::string_view text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
 
 // White paper that detectors want around the pattern: a cell of a marker, half a square, a dot.
 double quiet_zone(const Sheet& sheet) {
@@ -133,8 +126,8 @@ std::optional<PaperSize> paper_size(std::string_view name) {
   if (lower == "legal") return PaperSize{215.9, 355.6};
   const std::size_t cross = lower.find('x');
   if (cross == std::string::npos) return std::nullopt;
-  const auto width = number(std::string_view(lower).substr(0, cross));
-  const auto height = number(std::string_view(lower).substr(cross + 1));
+  const auto width = number_from_text(std::string_view(lower).substr(0, cross));
+  const auto height = number_from_text(std::string_view(lower).substr(cross + 1));
   if (!width || !height || !(*width > 0) || !(*height > 0)) return std::nullopt;
   return PaperSize{*width, *height};
 }

@@ -5,13 +5,13 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <unordered_map>
 
 #include "kinematics/geometry/input_error.h"
 #include "kinematics/geometry/pose.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/scalar_text.h"
 
 namespace hexcal {
 
@@ -66,16 +66,6 @@ std::string shown(const YAML::Node& node) {
   if (node.IsSequence()) return fmt::format("a list of {}", node.size());
   if (node.IsMap()) return "a mapping";
   return "nothing";
-}
-
-std::optional<double> parse_number(const std::string& text) {
-  double value = 0;
-  const char* begin = text.data();
-  const char* end = begin + text.size();
-  if (begin != end && *begin == '+') ++begin;
-  const auto [rest, error] = std::from_chars(begin, end, value);
-  if (error != std::errc() || rest != end || !std::isfinite(value)) return std::nullopt;
-  return value;
 }
 
 std::size_t edit_distance(const std::string& a, const std::string& b) {
@@ -150,7 +140,7 @@ YAML::Node require(const YamlMap& map, const YAML::Node& node, const YAML::Node&
 
 double YamlMap::number(const std::string& key) const {
   const YAML::Node node = require(*this, state_->node, state_->find(key), key, "a number");
-  const auto value = node.IsScalar() ? parse_number(node.Scalar()) : std::nullopt;
+  const auto value = node.IsScalar() ? number_from_text(node.Scalar()) : std::nullopt;
   if (!value) fail(key, fmt::format("found {}, wanted a number", shown(node)));
   return *value;
 }
@@ -204,7 +194,7 @@ std::vector<double> YamlMap::numbers(const std::string& key, std::size_t size) c
   }
   std::vector<double> values;
   for (const auto& entry : node) {
-    const auto value = entry.IsScalar() ? parse_number(entry.Scalar()) : std::nullopt;
+    const auto value = entry.IsScalar() ? number_from_text(entry.Scalar()) : std::nullopt;
     if (!value) fail(key, fmt::format("found {}, wanted a number", shown(entry)));
     values.push_back(*value);
   }
@@ -233,7 +223,7 @@ std::vector<Eigen::Vector3d> YamlMap::vectors3(const std::string& key, std::size
     if (!entry.IsSequence() || entry.size() != 3)
       fail(key, fmt::format("found {}, wanted [x, y, z]", shown(entry)));
     for (std::size_t i = 0; i < 3; ++i) {
-      const auto value = entry[i].IsScalar() ? parse_number(entry[i].Scalar()) : std::nullopt;
+      const auto value = entry[i].IsScalar() ? number_from_text(entry[i].Scalar()) : std::nullopt;
       if (!value) fail(key, fmt::format("found {}, wanted a number", shown(entry[i])));
       v[static_cast<Eigen::Index>(i)] = *value;
     }
