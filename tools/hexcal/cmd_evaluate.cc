@@ -11,6 +11,7 @@
 #include "calibration/statistics.h"
 #include "kinematics/geometry/input_error.h"
 #include "tools/hexcal/command.h"
+#include "tools/hexcal/error_tables.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/io/json_text.h"
 #include "tools/io/pose_table.h"
@@ -63,28 +64,7 @@ EvaluatedTable read_table(const fs::path& path, const std::string& label, const 
   return table;
 }
 
-std::string number(double value, int digits) { return fmt::format("{:.{}f}", value, digits); }
-
-Json json_of(const ErrorStatistics& s) {
-  const auto six = [](const Vector6d& v) {
-    Json list = Json::array();
-    for (Eigen::Index i = 0; i < 6; ++i) list.push_back(i < 3 ? v[i] : v[i] * kDegPerRad);
-    return list;
-  };
-  return {{"poses", s.poses},
-          {"range_mm_deg", six(s.range)},
-          {"position_magnitude_mm", s.position_magnitude_mm},
-          {"orientation_magnitude_deg", s.orientation_magnitude_rad * kDegPerRad},
-          {"mean_mm_deg", six(s.mean)},
-          {"rms_mm_deg", six(s.rms)},
-          {"max_mm_deg", six(s.max_abs)},
-          {"position_rms_mm", s.position_rms_mm},
-          {"position_max_mm", s.position_max_mm},
-          {"orientation_rms_deg", s.orientation_rms_rad * kDegPerRad},
-          {"orientation_max_deg", s.orientation_max_rad * kDegPerRad}};
-}
-
-Json json_of_improvement(const ErrorStatistics& before, const ErrorStatistics& after) {
+Json improvement_json(const ErrorStatistics& before, const ErrorStatistics& after) {
   const auto percent = improvement_percent;
   return {{"position_magnitude_percent", percent(before.position_magnitude_mm, after.position_magnitude_mm)},
           {"orientation_magnitude_percent",
@@ -95,15 +75,9 @@ Json json_of_improvement(const ErrorStatistics& before, const ErrorStatistics& a
 
 // Tables 2 to 4 of the paper: ranges, eq. 7 and improvements, each table over its own valid poses.
 std::string paper_table(const EvaluatedTable& before, const EvaluatedTable& after) {
-  TextTable text({"the paper's table", "poses", "x-tran_mm", "y-tran_mm", "z-tran_mm", "x-rot_deg",
-                  "y-rot_deg", "z-rot_deg", "position_mm", "orientation_deg"});
+  TextTable text(paper_columns("the paper's table"));
   const auto add = [&](const std::string& name, const ErrorStatistics& s) {
-    std::vector<std::string> cells{name, std::to_string(s.poses)};
-    for (Eigen::Index i = 0; i < 6; ++i)
-      cells.push_back(number(s.range[i] * (i < 3 ? 1 : kDegPerRad), i < 3 ? 3 : 4));
-    cells.push_back(number(s.position_magnitude_mm, 3));
-    cells.push_back(number(s.orientation_magnitude_rad * kDegPerRad, 4));
-    text.add_row(cells);
+    text.add_row(paper_row(name, s));
   };
   add("error range " + before.label, before.own);
   if (&after != &before) {
@@ -111,12 +85,12 @@ std::string paper_table(const EvaluatedTable& before, const EvaluatedTable& afte
     std::vector<std::string> cells(10);
     cells[0] = "magnitude of improvement";
     cells[8] =
-        number(improvement_percent(before.own.position_magnitude_mm, after.own.position_magnitude_mm), 1) +
+        decimal(improvement_percent(before.own.position_magnitude_mm, after.own.position_magnitude_mm), 1) +
         " %";
-    cells[9] =
-        number(improvement_percent(before.own.orientation_magnitude_rad, after.own.orientation_magnitude_rad),
-               1) +
-        " %";
+    cells[9] = decimal(improvement_percent(before.own.orientation_magnitude_rad,
+                                           after.own.orientation_magnitude_rad),
+                       1) +
+               " %";
     text.add_row(cells, Colour::bold);
   }
   return text.text();
@@ -130,11 +104,11 @@ std::string fair_table(const std::vector<EvaluatedTable>& tables) {
     const ErrorStatistics& s = table.common;
     const bool first = &table == &tables[0];
     text.add_row(
-        {table.label, number(s.position_rms_mm, 4), number(s.position_max_mm, 4),
-         number(s.orientation_rms_rad * kDegPerRad, 4), number(s.orientation_max_rad * kDegPerRad, 4),
-         first ? "" : number(improvement_percent(before.position_rms_mm, s.position_rms_mm), 2) + " %",
+        {table.label, decimal(s.position_rms_mm, 4), decimal(s.position_max_mm, 4),
+         decimal(s.orientation_rms_rad * kDegPerRad, 4), decimal(s.orientation_max_rad * kDegPerRad, 4),
+         first ? "" : decimal(improvement_percent(before.position_rms_mm, s.position_rms_mm), 2) + " %",
          first ? ""
-               : number(improvement_percent(before.orientation_rms_rad, s.orientation_rms_rad), 2) + " %"});
+               : decimal(improvement_percent(before.orientation_rms_rad, s.orientation_rms_rad), 2) + " %"});
   }
   return text.text();
 }
@@ -165,13 +139,13 @@ int run_evaluate(const EvaluateFlags& flags) {
   for (const EvaluatedTable& table : tables) {
     some_failed = some_failed || !table.without_pose.empty() || !table.without_target.empty();
     Json entry{{"table", table.label},
-               {"own_poses", json_of(table.own)},
-               {"common_poses", json_of(table.common)},
+               {"own_poses", error_json(table.own)},
+               {"common_poses", error_json(table.common)},
                {"without_pose", table.without_pose},
                {"without_target", table.without_target}};
     if (&table != &tables[0]) {
-      entry["improvement_own_poses"] = json_of_improvement(tables[0].own, table.own);
-      entry["improvement_common_poses"] = json_of_improvement(tables[0].common, table.common);
+      entry["improvement_own_poses"] = improvement_json(tables[0].own, table.own);
+      entry["improvement_common_poses"] = improvement_json(tables[0].common, table.common);
     }
     out["tables"].push_back(entry);
   }

@@ -23,7 +23,7 @@ struct LegsFlags {
   std::string pose;
 };
 
-struct Answer {
+struct LegsAnswer {
   std::string status = "ok";
   std::optional<LegVector> readings;
   std::string reason;
@@ -31,10 +31,10 @@ struct Answer {
 
 // Readings are written even where the pose cannot be held, with the limit that it breaks as status: they tell
 // by how much.
-Answer solve(const Machine& machine, const Pose& pose) {
+LegsAnswer solve(const Machine& machine, const Pose& pose) {
   const InverseResult verdict = inverse_kinematics(machine.geometry, machine.rest,
                                                    machine.geometry.B_from_P(pose), {.measure_all = false});
-  Answer answer{name(verdict.verdict), verdict.readings, reason(verdict)};
+  LegsAnswer answer{name(verdict.verdict), verdict.readings, reason(verdict)};
   if (machine.model) {
     answer.readings = readings_for_pose(*machine.model, pose);
     if (!answer.readings) answer = {"unreachable", std::nullopt, "the model has no readings for this pose"};
@@ -47,7 +47,7 @@ int run_legs(const LegsFlags& flags) {
     throw InputError("--poses, --pose: found none or both, wanted exactly one of them");
   const Machine machine = read_machine(flags.machine);
   if (!flags.pose.empty()) {
-    const Answer answer = solve(machine, pose_from_mm_deg(six_numbers(flags.pose, "--pose")));
+    const LegsAnswer answer = solve(machine, pose_from_mm_deg(six_numbers(flags.pose, "--pose")));
     if (answer.readings) {
       const LegVector& q = *answer.readings;
       fmt::print("{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}\n", q[0], q[1], q[2], q[3], q[4], q[5]);
@@ -60,7 +60,8 @@ int run_legs(const LegsFlags& flags) {
   transform.columns.assign(kPoseColumns.begin(), kPoseColumns.end());
   transform.header = "pose,status,q1,q2,q3,q4,q5,q6\n";
   transform.row = [&machine](const StreamedRow& row, std::string& out) {
-    const Answer answer = solve(machine, pose_from_mm_deg(Eigen::Map<const Vector6d>(row.numbers.data())));
+    const LegsAnswer answer =
+        solve(machine, pose_from_mm_deg(Eigen::Map<const Vector6d>(row.numbers.data())));
     out += csv_field(row.id);
     out += ',';
     out += answer.status;

@@ -27,23 +27,23 @@ struct PoseFlags {
   bool all = false;
 };
 
-struct Answer {
+struct PoseAnswer {
   std::string status = "ok";
   std::optional<Pose> pose;
   std::string reason;
 };
 
 // The feasible pose. What lies outside the limits is told with its numbers.
-Answer solve(const Machine& machine, const LegVector& readings) {
+PoseAnswer solve(const Machine& machine, const LegVector& readings) {
   if (machine.model) {
     const std::optional<Pose> pose = pose_for_readings(*machine.model, readings);
-    return pose ? Answer{"ok", pose, ""}
-                : Answer{"no_pose", std::nullopt, "the model has no pose for these readings"};
+    return pose ? PoseAnswer{"ok", pose, ""}
+                : PoseAnswer{"no_pose", std::nullopt, "the model has no pose for these readings"};
   }
   const PlatformGeometry& g = machine.geometry;
   const ForwardResult forward = forward_kinematics(g, lengths_from_readings(g, readings));
   if (!forward.B_from_P) return {name(forward.status), std::nullopt, forward.reason};
-  Answer answer{"ok", g.pose_from_B_from_P(*forward.B_from_P), ""};
+  PoseAnswer answer{"ok", g.pose_from_B_from_P(*forward.B_from_P), ""};
   const InverseResult verdict =
       inverse_kinematics(g, machine.rest, *forward.B_from_P, {.measure_all = false});
   if (!verdict.reachable()) {
@@ -94,7 +94,7 @@ bool append_modes(const Machine& machine, std::string_view id, const LegVector& 
 bool append_row(const Machine& machine, const PoseFlags& flags, const PoseBox& box, std::string_view id,
                 const LegVector& readings, std::string& out, std::string& why) {
   if (flags.all) return append_modes(machine, id, readings, out);
-  const Answer answer = solve(machine, readings);
+  const PoseAnswer answer = solve(machine, readings);
   out += csv_field(id);
   out += ',';
   out += answer.status;

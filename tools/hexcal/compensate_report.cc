@@ -7,6 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "tools/hexcal/error_tables.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/io/json_text.h"
 
@@ -14,8 +15,6 @@ namespace hexcal {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-std::string number(double value, int digits) { return fmt::format("{:.{}f}", value, digits); }
 
 std::string method_table(const CalibrationReport& report) {
   TextTable text({"method", "numbers", "rms_mm", "+-", "max_mm", "rms_deg", "+-", "max_deg", "lost"});
@@ -28,25 +27,23 @@ std::string method_table(const CalibrationReport& report) {
       continue;
     }
     const ErrorStatistics& e = method.errors;
-    text.add_row(
-        {label, std::to_string(method.complexity), number(e.position_rms_mm, 4),
-         number(method.position_rms_se_mm, 4), number(e.position_max_mm, 4),
-         number(e.orientation_rms_rad * kDegPerRad, 4), number(method.orientation_rms_se_rad * kDegPerRad, 4),
-         number(e.orientation_max_rad * kDegPerRad, 4),
-         i < report.evaluations.size() ? std::to_string(report.evaluations[i].dropped.size()) : "-"},
-        chosen ? Colour::bold : Colour::plain);
+    text.add_row({label, std::to_string(method.complexity), decimal(e.position_rms_mm, 4),
+                  decimal(method.position_rms_se_mm, 4), decimal(e.position_max_mm, 4),
+                  decimal(e.orientation_rms_rad * kDegPerRad, 4),
+                  decimal(method.orientation_rms_se_rad * kDegPerRad, 4),
+                  decimal(e.orientation_max_rad * kDegPerRad, 4),
+                  i < report.evaluations.size() ? std::to_string(report.evaluations[i].dropped.size()) : "-"},
+                 chosen ? Colour::bold : Colour::plain);
   }
   return text.text();
 }
 
 std::string paper_table(const CalibrationReport& report) {
-  TextTable text({"the paper's ranges", "poses", "x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg",
-                  "position_mm", "orientation_deg", "improvement"});
+  std::vector<std::string> columns = paper_columns("the paper's ranges");
+  columns.emplace_back("improvement");
+  TextTable text(columns);
   const auto add = [&](const std::string& name, const ErrorStatistics& s, const std::string& improvement) {
-    std::vector<std::string> cells{name, std::to_string(s.poses)};
-    for (Eigen::Index i = 0; i < 6; ++i) cells.push_back(number(s.range[i] * (i < 3 ? 1 : kDegPerRad), 3));
-    cells.push_back(number(s.position_magnitude_mm, 3));
-    cells.push_back(number(s.orientation_magnitude_rad * kDegPerRad, 3));
+    std::vector<std::string> cells = paper_row(name, s);
     cells.push_back(improvement);
     text.add_row(cells);
   };
@@ -103,28 +100,11 @@ const char* status_name(CommandStatus status) {
   return "";
 }
 
-Json six(const Vector6d& v) {
-  Json list = Json::array();
-  for (Eigen::Index i = 0; i < 6; ++i) list.push_back(i < 3 ? v[i] : v[i] * kDegPerRad);
-  return list;
-}
-
-Json json_of(const ErrorStatistics& s) {
-  return {{"poses", s.poses},
-          {"range_mm_deg", six(s.range)},
-          {"position_magnitude_mm", s.position_magnitude_mm},
-          {"orientation_magnitude_deg", s.orientation_magnitude_rad * kDegPerRad},
-          {"position_rms_mm", s.position_rms_mm},
-          {"position_max_mm", s.position_max_mm},
-          {"orientation_rms_deg", s.orientation_rms_rad * kDegPerRad},
-          {"orientation_max_deg", s.orientation_max_rad * kDegPerRad}};
-}
-
 // JSON has no infinity.
 Json finite(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
-Json json_of_identified(const IdentifyResult& identified, const Identifiability& judged,
-                        const ObservationTable& table) {
+Json identified_json(const IdentifyResult& identified, const Identifiability& judged,
+                     const ObservationTable& table) {
   Json out{{"free_parameters", judged.free_parameters},
            {"rank", judged.rank},
            {"determined", judged.determined},
@@ -151,7 +131,7 @@ Json json_of_identified(const IdentifyResult& identified, const Identifiability&
     out["legs"].push_back({{"leg", leg.leg}, {"wrong", leg.wrong}, {"diagnosis", leg.sentence}});
   const auto& poses = table.observations.poses;
   for (std::size_t i = 0; i < identified.pose_residuals.size() && i < poses.size(); ++i)
-    out["poses"].push_back({{"residual_mm_deg", six(identified.pose_residuals[i])},
+    out["poses"].push_back({{"residual_mm_deg", json_mm_deg(identified.pose_residuals[i])},
                             {"weight", identified.weights[i]},
                             {"influence", identified.influence[i]}});
   return out;
@@ -213,28 +193,28 @@ std::string compensation_json(const CalibrationReport& report, const Observation
     if (!method.failure.empty()) {
       entry["failure"] = method.failure;
     } else {
-      entry["cross_validated"] = json_of(method.errors);
+      entry["cross_validated"] = error_json(method.errors);
       entry["position_rms_se_mm"] = method.position_rms_se_mm;
       entry["orientation_rms_se_deg"] = method.orientation_rms_se_rad * kDegPerRad;
     }
     if (i < report.evaluations.size()) {
       entry["lost"] = report.evaluations[i].dropped;
-      entry["valid_before"] = json_of(report.evaluations[i].before);
-      entry["valid_after"] = json_of(report.evaluations[i].after);
+      entry["valid_before"] = error_json(report.evaluations[i].before);
+      entry["valid_after"] = error_json(report.evaluations[i].after);
     }
     out["methods"].push_back(entry);
   }
-  if (report.uncompensated) out["uncompensated"] = json_of(*report.uncompensated);
+  if (report.uncompensated) out["uncompensated"] = error_json(*report.uncompensated);
   out["outliers"] = report.outliers;
   out["unexplained"] = report.unexplained;
   for (const auto& pose : table.left_out)
     out["left_out"].push_back({{"pose", pose.id}, {"reason", pose.reason}});
   if (report.identifiability)
-    out["identified"] = json_of_identified(*report.fitted.identified, *report.identifiability, table);
+    out["identified"] = identified_json(*report.fitted.identified, *report.identifiability, table);
   for (const CorrectedCommand& command : commands) {
     Json entry{{"pose", command.id}, {"status", status_name(command.status)}};
     if (!command.reason.empty()) entry["reason"] = command.reason;
-    if (command.sigma) entry["sigma_mm_deg"] = six(*command.sigma);
+    if (command.sigma) entry["sigma_mm_deg"] = json_mm_deg(*command.sigma);
     out["commands"].push_back(entry);
   }
   for (const auto& path : written) out["written"].push_back(path.string());
