@@ -11,7 +11,7 @@
 namespace hexcal {
 namespace {
 
-constexpr std::size_t kLeastPhotographs = 5;  // fewer left out one by one say little
+constexpr std::size_t kLeastLeftOut = 5;  // fewer left out one by one say little
 
 CameraVariant with_terms(LensModel lens, const std::vector<std::string>& held) {
   CameraVariant variant;
@@ -34,12 +34,8 @@ CalibrationState for_variant(const CalibrationState& state, const CameraVariant&
   return out;
 }
 
-SheetAdjustmentOptions options_of(const CameraVariant& variant, double sigma_px) {
-  SheetAdjustmentOptions options;
-  options.board = variant.board;
-  options.free_parameters = variant.free_parameters;
-  options.extra_sigma_px = sigma_px;
-  options.with_covariance = false;
+SheetAdjustmentOptions trial_options(const CameraVariant& variant, double sigma_px) {
+  SheetAdjustmentOptions options = variant.adjustment_options(sigma_px);
   options.with_left_out = true;
   options.function_tolerance = 1e-7;
   return options;
@@ -109,7 +105,7 @@ std::vector<ModelTrial> try_variants(const std::vector<Sheet>& sheets, const Cal
   std::vector<ModelTrial> trials(variants.size());
   tbb::parallel_for(std::size_t{0}, variants.size(), [&](std::size_t i) {
     const SheetAdjustmentResult fit =
-        adjust_sheets(sheets, for_variant(state, variants[i]), options_of(variants[i], sigma_px));
+        adjust_sheets(sheets, for_variant(state, variants[i]), trial_options(variants[i], sigma_px));
     ModelTrial& trial = trials[i];
     trial.variant = variants[i];
     trial.name = variant_name(variants[i]);
@@ -137,7 +133,7 @@ std::size_t choose_trial(std::vector<ModelTrial>& trials) {
     return handicap(a.variant) * left_out_sum(a) < handicap(b.variant) * left_out_sum(b);
   };
   const bool validated = std::any_of(trials.begin(), trials.end(), [](const ModelTrial& trial) {
-    return trial.left_out_chi2.size() >= kLeastPhotographs;
+    return trial.left_out_chi2.size() >= kLeastLeftOut;
   });
   auto chosen = validated ? std::min_element(trials.begin(), trials.end(), by_left_out)
                           : std::min_element(trials.begin(), trials.end(), by_aicc);

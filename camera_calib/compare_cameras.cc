@@ -13,13 +13,6 @@ namespace {
 // their mean square scatters widely: this ratio is exceeded by chance about once in a hundred.
 constexpr double kSignificantRatio = 2.5;
 
-double mean_variance(const CalibratedCamera& camera) {
-  const ProjectionUncertainty uncertainty = projection_uncertainty(camera.model, camera.covariance);
-  double sum = 0;
-  for (const Eigen::Matrix2d& covariance : uncertainty.covariance_px2) sum += covariance.trace();
-  return sum / static_cast<double>(uncertainty.covariance_px2.size());
-}
-
 }  // namespace
 
 CameraComparison compare_cameras(const CalibratedCamera& first, const CalibratedCamera& second) {
@@ -31,7 +24,9 @@ CameraComparison compare_cameras(const CalibratedCamera& first, const Calibrated
   CameraComparison out;
   out.difference = projection_difference(first.model, second.model);
   if (first.covariance.size() > 0 && second.covariance.size() > 0) {
-    out.expected_rms_px = std::sqrt(mean_variance(first) + mean_variance(second));
+    out.expected_rms_px =
+        std::sqrt(projection_uncertainty(first.model, first.covariance).mean_variance_px2() +
+                  projection_uncertainty(second.model, second.covariance).mean_variance_px2());
     out.significant = out.difference.rms_px > kSignificantRatio * out.expected_rms_px;
   }
   return out;

@@ -4,14 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "camera_calib/initial_camera.h"
 
 namespace hexcal {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 struct Blob {
   Eigen::Vector2d centre_px;
@@ -37,9 +36,9 @@ std::vector<Blob> elliptic_blobs(const cv::Mat& dark) {
     const double area = cv::contourArea(contour);
     if (contour.size() < 10 || area < 25 || area > largest) continue;
     const cv::RotatedRect e = cv::fitEllipse(contour);
-    const double fitted = 0.25 * kPi * e.size.width * e.size.height;
+    const double fitted = 0.25 * std::numbers::pi * e.size.width * e.size.height;
     if (std::abs(fitted - area) > 0.15 * fitted || e.size.height > 5 * e.size.width) continue;
-    const double angle = e.angle * kPi / 180;
+    const double angle = e.angle * std::numbers::pi / 180;
     Blob blob;
     blob.centre_px = {e.center.x, e.center.y};
     blob.axes_px.col(0) = 0.5 * e.size.width * Eigen::Vector2d(std::cos(angle), std::sin(angle));
@@ -56,7 +55,7 @@ int arcs_around(const cv::Mat& dark, const Blob& blob) {
   std::array<bool, kSamples> is_dark{};
   int count = 0;
   for (int i = 0; i < kSamples; ++i) {
-    const double angle = 2 * kPi * i / kSamples;
+    const double angle = 2 * std::numbers::pi * i / kSamples;
     const Eigen::Vector2d at =
         blob.centre_px + radius * blob.axes_px * Eigen::Vector2d(std::cos(angle), std::sin(angle));
     const cv::Point px(cvRound(at.x()), cvRound(at.y()));

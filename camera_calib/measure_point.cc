@@ -4,13 +4,13 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
 namespace hexcal {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kSaddleSigmaPx = 0.05;
 constexpr double kDotSigmaPx = 0.05;
 constexpr double kMaxMovePx = 4;
@@ -29,7 +29,7 @@ Eigen::Vector2d disc_centroid(const Eigen::Matrix3d& image_from_plane, const Eig
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double area = 0;
   const auto corner = [&](int i) {
-    const double angle = 2 * kPi * i / kCorners;
+    const double angle = 2 * std::numbers::pi * i / kCorners;
     const Eigen::Vector2d at = centre + radius * Eigen::Vector2d(std::cos(angle), std::sin(angle));
     return Eigen::Vector2d((image_from_plane * at.homogeneous()).hnormalized());
   };
@@ -97,8 +97,9 @@ DotByArea dot_by_area(const cv::Mat& grey, const Eigen::Matrix3d& image_from_pla
   point.px = centre;
   double reach = 0;
   for (int i = 0; i < 8; ++i) {
-    const Eigen::Vector2d edge =
-        centre_in_plane + 1.8 * radius * Eigen::Vector2d(std::cos(kPi * i / 4), std::sin(kPi * i / 4));
+    const Eigen::Vector2d edge = centre_in_plane + 1.8 * radius *
+                                                       Eigen::Vector2d(std::cos(std::numbers::pi * i / 4),
+                                                                       std::sin(std::numbers::pi * i / 4));
     reach = std::max(reach, ((image_from_plane * edge.homogeneous()).hnormalized() - centre).norm());
   }
   const int half = static_cast<int>(std::ceil(reach));
@@ -150,7 +151,7 @@ DotByArea dot_by_area(const cv::Mat& grey, const Eigen::Matrix3d& image_from_pla
   const Eigen::Matrix3d& g = plane_from_image;
   const Eigen::Vector3d h = g * (sum / weights).homogeneous();
   const Eigen::Matrix2d by_px = (g.topLeftCorner<2, 2>() - h.hnormalized() * g.block<1, 2>(2, 0)) / h.z();
-  dot.radius = std::sqrt(weights * std::abs(by_px.determinant()) / kPi);
+  dot.radius = std::sqrt(weights * std::abs(by_px.determinant()) / std::numbers::pi);
   const Eigen::Vector2d eccentricity = disc_centroid(image_from_plane, centre_in_plane, dot.radius) - centre;
   point.px = sum / weights - eccentricity;
   point.covariance_px2 = kDotSigmaPx * kDotSigmaPx * Eigen::Matrix2d::Identity();

@@ -74,6 +74,12 @@ double ProjectionUncertainty::sigma_px(std::size_t i) const {
   return std::sqrt(std::max(0.0, eigen.eigenvalues()[1]));
 }
 
+double ProjectionUncertainty::mean_variance_px2() const {
+  double sum = 0;
+  for (const Eigen::Matrix2d& covariance : covariance_px2) sum += covariance.trace();
+  return sum / static_cast<double>(covariance_px2.size());
+}
+
 ProjectionUncertainty projection_uncertainty(const CameraModel& camera, const Eigen::MatrixXd& covariance,
                                              int columns, int rows) {
   ProjectionUncertainty out;

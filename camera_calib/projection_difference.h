@@ -33,6 +33,8 @@ struct ProjectionUncertainty {
   std::vector<Eigen::Matrix2d> covariance_px2;
 
   [[nodiscard]] double sigma_px(std::size_t i) const;
+  /// Mean over the frame of the variance of both coordinates together.
+  [[nodiscard]] double mean_variance_px2() const;
 };
 
 [[nodiscard]] ProjectionUncertainty projection_uncertainty(const CameraModel& camera,

@@ -105,16 +105,16 @@ void test_features(SheetAdjustmentResult& result, double extra, double probabili
   }
 }
 
-SheetAdjustmentOptions options_of(const CameraVariant& variant, double sigma_px) {
+}  // namespace
+
+SheetAdjustmentOptions CameraVariant::adjustment_options(double extra_sigma_px) const {
   SheetAdjustmentOptions options;
-  options.board = variant.board;
-  options.free_parameters = variant.free_parameters;
-  options.extra_sigma_px = sigma_px;
+  options.board = board;
+  options.free_parameters = free_parameters;
+  options.extra_sigma_px = extra_sigma_px;
   options.with_covariance = false;
   return options;
 }
-
-}  // namespace
 
 RobustFitResult robust_fit(const std::vector<Sheet>& sheets, const CalibrationState& start,
                            const CameraVariant& variant, double start_sigma_px,
@@ -124,7 +124,7 @@ RobustFitResult robust_fit(const std::vector<Sheet>& sheets, const CalibrationSt
   state.camera = converted_camera(start.camera, variant.lens);
   double sigma = start_sigma_px;
   for (int round = 0; round < options.rounds; ++round) {
-    SheetAdjustmentOptions adjust = options_of(variant, sigma);
+    SheetAdjustmentOptions adjust = variant.adjustment_options(sigma);
     adjust.robust = options.reject && round == 0;
     out.adjustment = adjust_sheets(sheets, state, adjust);
     if (!out.adjustment.converged) return out;
@@ -134,7 +134,7 @@ RobustFitResult robust_fit(const std::vector<Sheet>& sheets, const CalibrationSt
     sigma = unexplained_sigma(out.adjustment, false);
     state = out.adjustment.state;
   }
-  SheetAdjustmentOptions last = options_of(variant, sigma);
+  SheetAdjustmentOptions last = variant.adjustment_options(sigma);
   last.with_covariance = options.with_covariance;
   out.adjustment = adjust_sheets(sheets, state, last);
   out.extra_sigma_px = sigma;

@@ -11,6 +11,9 @@ struct CameraVariant {
   LensModel lens = LensModel::brown;
   std::vector<char> free_parameters;  ///< per parameter; empty: all but the affinity
   BoardFreedom board = BoardFreedom::ideal;
+
+  /// Of an adjustment of this variant, without covariances.
+  [[nodiscard]] SheetAdjustmentOptions adjustment_options(double extra_sigma_px) const;
 };
 
 struct RobustFitOptions {

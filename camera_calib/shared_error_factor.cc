@@ -26,10 +26,7 @@ int cell_of(const Eigen::Vector2d& px, const CameraModel& camera) {
 }
 
 double mean_variance(const CameraModel& camera, const Eigen::MatrixXd& covariance) {
-  const ProjectionUncertainty uncertainty = projection_uncertainty(camera, covariance, 12, 8);
-  double sum = 0;
-  for (const Eigen::Matrix2d& at : uncertainty.covariance_px2) sum += at.trace();
-  return sum / static_cast<double>(uncertainty.covariance_px2.size());
+  return projection_uncertainty(camera, covariance, 12, 8).mean_variance_px2();
 }
 
 // Rows of the system that share something, numbered 0, 1, ... in the order of first use.

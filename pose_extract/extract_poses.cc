@@ -17,8 +17,6 @@
 namespace hexcal {
 namespace {
 
-constexpr double kScaleDisagreementSigmas = 3.0;
-
 int marker_index(const Network& network, int id) {
   for (std::size_t m = 0; m < network.markers.size(); ++m) {
     if (network.markers[m].id == id) return static_cast<int>(m);

@@ -13,9 +13,8 @@
 namespace hexcal {
 namespace {
 
-constexpr double kAmbiguousSigmas2 =
-    30;  // rise of the sum of squares below which the flipped pose stays possible
-constexpr double kScaleDisagreementSigmas = 3;
+// Rise of the sum of squares below which the flipped pose stays possible.
+constexpr double kAmbiguousSigmas2 = 30;
 // Residuals over what the photographs promise, beyond which something is wrong with the whole: real lenses
 // and prints stay below 2.
 constexpr double kSuspectSigma0 = 3;

@@ -4,6 +4,9 @@
 
 namespace hexcal {
 
+/// Two sources of the scale that differ by more disagree.
+inline constexpr double kScaleDisagreementSigmas = 3;
+
 /// Status and words of each photograph after the adjustment.
 void judge_photographs(const CampaignObservations& observations, CampaignResult& result);
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <numbers>
 
 #include "kinematics/geometry/rigid3.h"
 
@@ -9,8 +10,8 @@ namespace hexcal {
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-inline constexpr double kRadPerDeg = 3.14159265358979323846 / 180.0;
-inline constexpr double kDegPerRad = 180.0 / 3.14159265358979323846;
+inline constexpr double kRadPerDeg = std::numbers::pi / 180.0;
+inline constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
 /// R = Rz(yaw) * Ry(pitch) * Rx(roll); rpy = (roll, pitch, yaw) in rad.
 [[nodiscard]] Eigen::Quaterniond quaternion_from_rpy(const Eigen::Vector3d& rpy_rad);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "kinematics/geometry/input_error.h"
 #include "photogrammetry/markers/marker.h"
@@ -11,7 +12,6 @@
 namespace hexcal {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr int kSides = 12;
 constexpr int kFacing = 5;          // sides that face the camera
 constexpr double kRowPitchMm = 32;  // at 24 mm markers
@@ -54,18 +54,19 @@ Rigid3 side_frame(double angle, double apothem_mm, double z_mm) {
 // A regular prism about the z axis of `pose`.
 void add_prism(std::vector<Surface>& surfaces, const Rigid3& pose, int sides, double apothem_mm,
                double z_low_mm, double z_high_mm, const Material& material) {
-  const double half_width = apothem_mm * std::tan(kPi / sides);
+  const double half_width = apothem_mm * std::tan(std::numbers::pi / sides);
   const double half_height = 0.5 * (z_high_mm - z_low_mm);
   std::vector<Eigen::Vector2d> cap;
   for (int i = 0; i < sides; ++i) {
-    const double angle = 2 * kPi * i / sides;
+    const double angle = 2 * std::numbers::pi * i / sides;
     surfaces.push_back(plain_surface(pose * side_frame(angle, apothem_mm, 0.5 * (z_low_mm + z_high_mm)),
                                      rectangle_outline(half_width, half_height), material));
-    const double edge = angle + kPi / sides;
-    cap.push_back(apothem_mm / std::cos(kPi / sides) * Eigen::Vector2d(std::cos(edge), std::sin(edge)));
+    const double edge = angle + std::numbers::pi / sides;
+    cap.push_back(apothem_mm / std::cos(std::numbers::pi / sides) *
+                  Eigen::Vector2d(std::cos(edge), std::sin(edge)));
   }
   surfaces.push_back(plain_surface(pose * Rigid3::from_translation({0, 0, z_high_mm}), cap, material));
-  const Rigid3 upside_down(quaternion_from_rotation_vector({kPi, 0, 0}), {0, 0, z_low_mm});
+  const Rigid3 upside_down(quaternion_from_rotation_vector({std::numbers::pi, 0, 0}), {0, 0, z_low_mm});
   surfaces.push_back(plain_surface(pose * upside_down, cap, material));
 }
 
@@ -145,11 +146,11 @@ Rig make_rig(std::uint64_t seed, const MarkerLayout& layout, const PlatformGeome
   rig.geometry = geometry;
   RandomSource random(seed, 3);
   const double side_mm = sticker_side_mm(pattern_of(layout.family, 0), layout.size_mm);
-  const double apothem = 0.5 * (side_mm + 3) / std::tan(kPi / kSides);
+  const double apothem = 0.5 * (side_mm + 3) / std::tan(std::numbers::pi / kSides);
   const double row_pitch = side_mm + kRowPitchMm - 30;
   for (const bool moving : {false, true}) {
     for (int i = 0; i < 2 * kFacing; ++i) {
-      const double angle = (i % kFacing - (kFacing - 1) / 2) * 2 * kPi / kSides;
+      const double angle = (i % kFacing - (kFacing - 1) / 2) * 2 * std::numbers::pi / kSides;
       const double depth = row_pitch * (i / kFacing + 0.5) + 1.5;  // from the end plate
       const double angle_sigma = layout.angle_sigma_deg * kRadPerDeg;
       const Eigen::Vector3d turn(0.1 * angle_sigma * random.normal(), 0.1 * angle_sigma * random.normal(),

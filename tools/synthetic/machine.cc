@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "calibration/statistics.h"
 #include "kinematics/forward.h"
@@ -51,8 +52,8 @@ std::optional<Rigid3> true_B_from_P(const VirtualMachine& machine, const LegVect
   const MachineErrors& errors = machine.errors;
   LegVector lengths = lengths_from_readings(machine.as_built, readings);
   for (Eigen::Index i = 0; i < 6; ++i) {
-    lengths[i] += errors.stroke_wave_mm * std::sin(2 * 3.14159265358979323846 * readings[i] / kWaveLengthMm +
-                                                   machine.wave_phase_rad[i]);
+    lengths[i] += errors.stroke_wave_mm *
+                  std::sin(2 * std::numbers::pi * readings[i] / kWaveLengthMm + machine.wave_phase_rad[i]);
     const double way = readings[i] - before[i];
     if (way != 0) lengths[i] -= std::copysign(0.5 * errors.backlash_mm, way);
   }

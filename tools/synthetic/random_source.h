@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 
 namespace hexcal {
 
@@ -28,7 +29,7 @@ class RandomSource {
   /// Mean 0, standard deviation 1 (Box and Muller 1958).
   double normal() {
     const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform(0, 1)));
-    return radius * std::cos(uniform(0, 2 * 3.14159265358979323846));
+    return radius * std::cos(uniform(0, 2 * std::numbers::pi));
   }
 
  private:

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "kinematics/geometry/input_error.h"
@@ -27,7 +28,7 @@ const std::vector<float>& normal_quantiles() {
       double x = 0;
       for (int iteration = 0; iteration < 60; ++iteration) {
         const double error = 0.5 * std::erfc(-x / std::sqrt(2.0)) - p;
-        const double step = error / (std::exp(-0.5 * x * x) / std::sqrt(2 * 3.14159265358979323846));
+        const double step = error / (std::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi));
         x -= std::clamp(step, -0.5, 0.5);
       }
       z[static_cast<std::size_t>(i)] = x;
