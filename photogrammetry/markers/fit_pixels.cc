@@ -9,7 +9,7 @@
 namespace hexcal {
 namespace {
 
-constexpr int kTile = 8;  // px; JPEG's blocks, on its grid
+constexpr int kBlockPx = 8;  // px; JPEG's blocks, on its grid
 
 // A pseudo-random number of a tile: thinning must not alias with the pattern.
 std::uint32_t tile_lot(int column, int row) {
@@ -24,8 +24,8 @@ std::uint32_t tile_lot(int column, int row) {
 }
 
 // The order in which a tile's pixels are taken, 8 y + x: any first few are spread evenly (Bayer 1973).
-constexpr std::array<unsigned, kTile* kTile> kBayerOrder = [] {
-  std::array<unsigned, kTile * kTile> order{};
+constexpr std::array<unsigned, kBlockPx* kBlockPx> kBayerOrder = [] {
+  std::array<unsigned, kBlockPx * kBlockPx> order{};
   for (unsigned k = 0; k < order.size(); ++k) {
     unsigned x = 0;
     unsigned y = 0;
@@ -35,7 +35,7 @@ constexpr std::array<unsigned, kTile* kTile> kBayerOrder = [] {
       x |= (a ^ b) << (2 - bit);
       y |= a << (2 - bit);
     }
-    order[k] = kTile * y + x;
+    order[k] = kBlockPx * y + x;
   }
   return order;
 }();
@@ -143,15 +143,15 @@ FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, 
   const double all = within(selection.reach_px);
   const double near = std::min(within(selection.near_px), all);
   const double share = selection.max_pixels / std::max(near + (all - near) / 4, 1.0);
-  const auto of_tile = [](double taken) { return kTile * kTile * std::min(taken, 1.0); };
+  const auto of_tile = [](double taken) { return kBlockPx * kBlockPx * std::min(taken, 1.0); };
   const double near_share = of_tile(share);
   const double far_share = of_tile(share / 4);
 
   // Most of a large marker is far from any transition: whole tiles are passed over when the pattern does not
   // change within the reach of any of their pixels. Within a tile the map to cells is taken as linear when
   // the single pixels are looked at.
-  constexpr double kMiddle = 0.5 * (kTile - 1);
-  constexpr double kTileReach = 1.1 * kTile;  // half its diagonal, 5.7 px, and perspective within it
+  constexpr double kMiddle = 0.5 * (kBlockPx - 1);
+  constexpr double kTileReach = 1.1 * kBlockPx;  // half its diagonal, 5.7 px, and perspective within it
   struct Tile {
     Eigen::Vector2d cells;  // of its middle
     Eigen::Matrix2d by_px;
@@ -203,20 +203,21 @@ FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, 
       return std::clamp(static_cast<int>(std::floor(at)), -1, cells) + 1;
     };
     pixel.cell = cell_of(u.y()) * (cells + 2) + cell_of(u.x());
-    pixel.block = (y / kTile - box.y / kTile) * (box.width / kTile + 2) + (x / kTile - box.x / kTile);
+    pixel.block =
+        (y / kBlockPx - box.y / kBlockPx) * (box.width / kBlockPx + 2) + (x / kBlockPx - box.x / kBlockPx);
     result.pixels.push_back(pixel);
   };
 
   const int bottom = box.y + box.height - 1;
-  std::array<PixelMapPatch::Row, kTile> rows;
-  for (int tile_row = box.y / kTile; tile_row <= bottom / kTile; ++tile_row) {
-    const int top = tile_row * kTile;
-    const Span span = span_in_rows(hull, top - 1, top + kTile, box);
+  std::array<PixelMapPatch::Row, kBlockPx> rows;
+  for (int tile_row = box.y / kBlockPx; tile_row <= bottom / kBlockPx; ++tile_row) {
+    const int top = tile_row * kBlockPx;
+    const Span span = span_in_rows(hull, top - 1, top + kBlockPx, box);
     if (span.first > span.last) continue;
     const PixelMapPatch::Row middle_row = patch.row(top + kMiddle);
-    for (int i = 0; i < kTile; ++i) rows[static_cast<std::size_t>(i)] = patch.row(top + i);
-    for (int column = span.first / kTile; column <= span.last / kTile; ++column) {
-      const int left = column * kTile;
+    for (int i = 0; i < kBlockPx; ++i) rows[static_cast<std::size_t>(i)] = patch.row(top + i);
+    for (int column = span.first / kBlockPx; column <= span.last / kBlockPx; ++column) {
+      const int left = column * kBlockPx;
       const std::optional<Tile> tile = tile_at(middle_row, left);
       if (!tile) continue;
       const std::uint32_t lot = tile_lot(column, tile_row);
@@ -225,8 +226,8 @@ FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, 
       const auto far_pixels = static_cast<std::size_t>(far_share + rounding);
       for (std::size_t k = 0; k < near_pixels; ++k) {
         const auto at = static_cast<int>(kBayerOrder[k] ^ (lot & 63U));
-        const int in_x = at % kTile;
-        const int in_y = at / kTile;
+        const int in_x = at % kBlockPx;
+        const int in_y = at / kBlockPx;
         const int x = left + in_x;
         const int y = top + in_y;
         if (x < box.x || x >= box.x + box.width || y < box.y || y > bottom) continue;
