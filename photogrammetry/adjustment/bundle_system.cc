@@ -83,6 +83,7 @@ void eliminate(EpochBlocks& blocks, double damping, EpochElimination& epoch, Red
     blocks.epoch_right -= blocks.photo_epoch[i].transpose() * photo.start;
     blocks.epoch_common.noalias() -= blocks.photo_epoch[i].transpose() * photo.by_common;
     reduced.right.noalias() -= blocks.photo_common[i].transpose() * photo.start;
+    if (width == 0) continue;  // all common parameters are held, as on a map of the markers
     const auto row = 6 * static_cast<Eigen::Index>(i);
     blocks_by_common.middleRows<6>(row) = blocks.photo_common[i];
     eliminated_by_common.middleRows<6>(row) = photo.by_common;
@@ -94,8 +95,10 @@ void eliminate(EpochBlocks& blocks, double damping, EpochElimination& epoch, Red
     epoch.decrease = epoch.start.dot(blocks.epoch_right);
     epoch.by_common.noalias() = epoch.inverse * blocks.epoch_common;
     reduced.right.noalias() -= blocks.epoch_common.transpose() * epoch.start;
-    blocks_by_common.bottomRows<6>() = blocks.epoch_common;
-    eliminated_by_common.bottomRows<6>() = epoch.by_common;
+    if (width > 0) {
+      blocks_by_common.bottomRows<6>() = blocks.epoch_common;
+      eliminated_by_common.bottomRows<6>() = epoch.by_common;
+    }
   }
   if (count > 0 && reduced.normal.size() > 0) {
     reduced.normal.triangularView<Eigen::Lower>() -= blocks_by_common.transpose() * eliminated_by_common;
