@@ -8,6 +8,7 @@ namespace hexcal {
 namespace {
 
 constexpr int kMaxId = 1'000'000;
+constexpr int kMaxRange = 100'000;  // more than any family has
 constexpr std::string_view kBlanks = " \t\r";
 
 // Nothing unless all of the text is a number.
@@ -42,7 +43,7 @@ std::optional<IdRange> id_range_from_text(std::string_view text) {
   const std::size_t dash = text.find('-');
   const auto first = id_from_text(text.substr(0, dash));
   const auto last = dash == std::string_view::npos ? first : id_from_text(text.substr(dash + 1));
-  if (!first || !last || *last < *first) return std::nullopt;
+  if (!first || !last || *last < *first || *last - *first > kMaxRange) return std::nullopt;
   return IdRange{*first, *last};
 }
 

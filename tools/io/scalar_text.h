@@ -12,7 +12,8 @@ namespace hexcal {
 /// locale.
 [[nodiscard]] std::optional<double> number_from_text(std::string_view text);
 
-/// Marker ids as people write them in files and flags: `9`, or `0-9` with both ends; 0 to 1 000 000.
+/// Marker ids as people write them in files and flags: `9`, or `0-9` with both ends; 0 to 1 000 000, a range
+/// of 100 000 at most.
 struct IdRange {
   int first = 0;
   int last = 0;

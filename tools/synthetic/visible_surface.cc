@@ -122,12 +122,9 @@ float VisibleSurface::irradiance(const Eigen::Vector2d& at) const {
 float VisibleSurface::grain(const Eigen::Vector2d& at) const {
   if (grain_ <= 0 || !at.allFinite()) return 1;
   const auto& texture = grain_texture();
-  // The texture repeats; a grazing ray meets the plane kilometres away.
-  const auto folded = [this](double mm) {
-    const double texels = std::fmod(mm * texels_per_mm_ + 1e6, kTexels);
-    return texels < 0 ? texels + kTexels : texels;
-  };
-  const Eigen::Vector2d p(folded(at.x()), folded(at.y()));
+  // The texture repeats; a grazing ray meets the plane kilometres away, where no int holds the index.
+  const Eigen::Array2d texels = at.array() * texels_per_mm_ + 1e6;
+  const Eigen::Array2d p = texels - kTexels * (texels / kTexels).floor();
   const int x = static_cast<int>(p.x());
   const int y = static_cast<int>(p.y());
   const auto u = static_cast<float>(p.x() - x);
