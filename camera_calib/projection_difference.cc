@@ -70,7 +70,8 @@ ProjectionDifference projection_difference(const CameraModel& first, const Camer
 }
 
 double ProjectionUncertainty::sigma_px(std::size_t i) const {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(covariance_px2[i], Eigen::EigenvaluesOnly);
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen;
+  eigen.computeDirect(covariance_px2[i], Eigen::EigenvaluesOnly);
   return std::sqrt(std::max(0.0, eigen.eigenvalues()[1]));
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "kinematics/geometry/covariance.h"
+#include "kinematics/geometry/rigid3.h"
 
 namespace hexcal {
 namespace {
@@ -54,10 +55,10 @@ std::vector<Rigid3> closed_form(const Eigen::Matrix3d& h, const std::array<Eigen
   const double q = h(1, 2);
   Eigen::Matrix2d jacobian;  // of the homography at the marker's centre
   jacobian << h(0, 0) - h(2, 0) * p, h(0, 1) - h(2, 1) * p, h(1, 0) - h(2, 0) * q, h(1, 1) - h(2, 1) * q;
-  // Rotation that takes the optical axis to the line of sight (p, q, 1).
-  const Eigen::Matrix3d to_sight =
-      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), Eigen::Vector3d(p, q, 1))
-          .toRotationMatrix();
+  // The smallest rotation that takes the optical axis to the line of sight (p, q, 1), by Rodrigues' formula.
+  const Eigen::Vector3d sight = Eigen::Vector3d(p, q, 1).normalized();
+  const Eigen::Matrix3d axis = skew(Eigen::Vector3d::UnitZ().cross(sight));
+  const Eigen::Matrix3d to_sight = Eigen::Matrix3d::Identity() + axis + axis * axis / (1 + sight.z());
   Eigen::Matrix<double, 2, 3> perspective;
   perspective << 1, 0, -p, 0, 1, -q;
   const Eigen::Matrix2d b = perspective * to_sight.leftCols<2>();
