@@ -99,6 +99,17 @@ TEST_F(CommandRefusals, OfPhotographsAndCameras) {
          "--measured-ruler-mm: found '994', wanted the two 100 mm rulers' lengths as in 99.4x99.7");
 }
 
+TEST_F(CommandRefusals, OfACampaignWhoseCameraIsNotCalibrated) {
+  fs::remove(file("lab/camera.yaml"));
+  for (const char* command : {"measure", "run"}) {
+    const CommandResult result = run_hexcal({command, file("lab")});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr("campaign.yaml: camera: " + file("lab/camera.yaml") +
+                                      ": no such file; hexcal camera PHOTOGRAPHS --template SHEET -o " +
+                                      file("lab/camera.yaml") + " makes it"));
+  }
+}
+
 TEST_F(CommandRefusals, OfSheetsAndSimulations) {
   const std::string pdf = file("t.pdf");
   expect({"template", "markers", "--marker-mm", "24", "--gap-mm", "8", "-o", pdf},

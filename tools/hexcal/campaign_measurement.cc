@@ -100,6 +100,11 @@ OpenCampaign open_campaign(const MeasureRequest& request) {
   open.results = campaign.folder / "results";
   open.poses_csv = request.output.value_or(open.results / "poses.csv");
   for (const CampaignCamera& camera : campaign.cameras) {
+    if (!fs::exists(camera.file)) {
+      throw InputError(fmt::format(
+          "{}: camera: {}: no such file; hexcal camera PHOTOGRAPHS --template SHEET -o {} makes it",
+          campaign.file.string(), camera.file.string(), camera.file.string()));
+    }
     open.cameras.push_back(read_camera_file(camera.file));
     open.camera_sha256.push_back(sha256_hex(read_file(camera.file)));
   }
