@@ -130,17 +130,19 @@ const std::vector<std::string>& marker_family_names() {
   return names;
 }
 
-const MarkerFamily& marker_family(const std::string& name) {
+const MarkerFamily& marker_family(std::string_view name) {
   static std::mutex mutex;
-  static std::map<std::string, MarkerFamily> families;
+  static std::map<std::string, MarkerFamily, std::less<>> families;
   const std::lock_guard<std::mutex> lock(mutex);
   const auto known = families.find(name);
   if (known != families.end()) return known->second;
   for (const auto& family : kAprilTagFamilies) {
-    if (name == family.name) return families.emplace(name, april_tag_family(family)).first->second;
+    if (name == family.name)
+      return families.emplace(std::string(name), april_tag_family(family)).first->second;
   }
   for (const auto& dictionary : kArucoDictionaries) {
-    if (name == dictionary.name) return families.emplace(name, aruco_family(dictionary)).first->second;
+    if (name == dictionary.name)
+      return families.emplace(std::string(name), aruco_family(dictionary)).first->second;
   }
   throw InputError(fmt::format("marker family '{}' is not known; wanted one of {}", name,
                                fmt::join(marker_family_names(), ", ")));

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace hexcal {
@@ -26,7 +27,7 @@ struct MarkerFamily {
 };
 
 /// All patterns of a family. Throws InputError naming the known families if the name is none of them.
-[[nodiscard]] const MarkerFamily& marker_family(const std::string& name);
+[[nodiscard]] const MarkerFamily& marker_family(std::string_view name);
 [[nodiscard]] const std::vector<std::string>& marker_family_names();
 
 enum class MarkerStatus {

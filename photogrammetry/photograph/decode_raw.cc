@@ -39,7 +39,11 @@ DecodedImage develop(std::string_view bytes) {
   params.no_auto_bright = 1;
   params.output_color = 0;
   params.user_flip = 0;
+#if LIBRAW_VERSION >= LIBRAW_MAKE_VERSION(0, 21, 0)
+  raw->imgdata.rawparams.max_raw_memory_mb = kMaxRawMegabytes;
+#else
   params.max_raw_memory_mb = kMaxRawMegabytes;
+#endif
   params.user_qual = 0;  // bilinear: linear in the samples, so edges keep their place
   std::fill(std::begin(params.user_mul), std::end(params.user_mul), 1.0F);
   const auto failed = [&image](int code) {

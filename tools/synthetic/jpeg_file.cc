@@ -7,6 +7,7 @@
 #include <exiv2/exiv2.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <string>
 #include <vector>
 
 #include "kinematics/geometry/input_error.h"
@@ -54,9 +55,9 @@ void write_jpeg(const std::filesystem::path& path, const cv::Mat& photograph, co
   image->writeMetadata();
   Exiv2::BasicIo& io = image->io();
   io.open();
-  const Exiv2::DataBuf data = io.read(static_cast<long>(io.size()));
-  write_file_atomically(path,
-                        {reinterpret_cast<const char*>(data.pData_), static_cast<std::size_t>(data.size_)});
+  std::string data(static_cast<std::size_t>(io.size()), '\0');
+  io.read(reinterpret_cast<Exiv2::byte*>(data.data()), static_cast<long>(data.size()));
+  write_file_atomically(path, data);
 }
 
 std::string capture_time(int seconds) {
