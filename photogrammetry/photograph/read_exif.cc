@@ -1,4 +1,6 @@
+#include <cstdint>
 #include <exiv2/exiv2.hpp>
+#include <limits>
 #include <mutex>
 
 #include "photogrammetry/photograph/decoders.h"
@@ -57,10 +59,15 @@ class ExifReader {
   const Exiv2::ExifData& data_;
 };
 
+// Of a damaged file Exiv2 tells any number; 0 is unknown.
+int size_px(std::int64_t told) {
+  return told > 0 && told <= std::numeric_limits<int>::max() ? static_cast<int>(told) : 0;
+}
+
 PhotographInfo info_from(const Exiv2::Image& image) {
   PhotographInfo info;
-  info.width_px = image.pixelWidth();
-  info.height_px = image.pixelHeight();
+  info.width_px = size_px(image.pixelWidth());
+  info.height_px = size_px(image.pixelHeight());
   const ExifReader exif(image.exifData());
   info.make = exif.text("Exif.Image.Make");
   info.model = exif.text("Exif.Image.Model");
