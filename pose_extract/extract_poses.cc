@@ -43,7 +43,7 @@ Network make_network(const Campaign& campaign, const CampaignObservations& obser
     NetworkPhoto photo;
     photo.camera = std::max(0, photograph.camera);
     photo.epoch = epoch_of.at(photograph.pose);
-    if (photographs[p].status == PhotoStatus::ok) photo.markers = photograph.seen.markers;
+    if (is_used(photographs[p].status)) photo.markers = photograph.seen.markers;
     network.photos.push_back(std::move(photo));
   }
   for (const KnownLength& bar : campaign.bars) {

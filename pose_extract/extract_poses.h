@@ -47,6 +47,7 @@ struct ExtractOptions {
 
 enum class PhotoStatus {
   ok,
+  suspect,       ///< used, but something contradicts it: the words say what
   unreadable,    ///< the file
   wrong_camera,  ///< another image size, body, lens or focal length than the camera file's
   duplicate,     ///< the same photograph twice
@@ -55,8 +56,11 @@ enum class PhotoStatus {
   disagrees,     ///< most of its markers contradict the others
 };
 
+/// `ok` is a promise; a suspect pose has numbers and sigmas, and words for what contradicts it; all others
+/// failed and have no numbers. Only `ok` poses enter a compensation unasked.
 enum class PoseStatus {
   ok,
+  suspect,
   no_photographs,
   no_usable_photographs,
   same_photographs,  ///< as another pose
@@ -67,6 +71,15 @@ enum class PoseStatus {
   contradictory,  ///< most markers rejected
   no_datum,       ///< UG or LG could not be found
 };
+
+/// True of photographs that entered the adjustment.
+[[nodiscard]] constexpr bool is_used(PhotoStatus status) {
+  return status == PhotoStatus::ok || status == PhotoStatus::suspect;
+}
+/// True of poses that have numbers.
+[[nodiscard]] constexpr bool is_measured(PoseStatus status) {
+  return status == PoseStatus::ok || status == PoseStatus::suspect;
+}
 
 [[nodiscard]] const char* photo_status_name(PhotoStatus status);
 [[nodiscard]] const char* pose_status_name(PoseStatus status);

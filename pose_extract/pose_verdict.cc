@@ -195,6 +195,8 @@ const char* photo_status_name(PhotoStatus status) {
   switch (status) {
     case PhotoStatus::ok:
       return "ok";
+    case PhotoStatus::suspect:
+      return "suspect";
     case PhotoStatus::unreadable:
       return "unreadable";
     case PhotoStatus::wrong_camera:
@@ -215,6 +217,8 @@ const char* pose_status_name(PoseStatus status) {
   switch (status) {
     case PoseStatus::ok:
       return "ok";
+    case PoseStatus::suspect:
+      return "suspect";
     case PoseStatus::no_photographs:
       return "no_photographs";
     case PoseStatus::no_usable_photographs:
@@ -237,6 +241,16 @@ const char* pose_status_name(PoseStatus status) {
   return "unknown";
 }
 
+void suspect(MeasuredPose& pose, const std::string& words) {
+  if (pose.status == PoseStatus::ok) pose.status = PoseStatus::suspect;
+  add_words(pose.words, words);
+}
+
+void suspect(MeasuredPhotograph& photograph, const std::string& words) {
+  if (photograph.status == PhotoStatus::ok) photograph.status = PhotoStatus::suspect;
+  add_words(photograph.words, words);
+}
+
 void judge_photographs(const CampaignObservations& observations, CampaignResult& result) {
   std::vector<int> known(result.photographs.size(), 0);
   for (const Sighting& sighting : result.adjusted.sightings) {
@@ -247,7 +261,7 @@ void judge_photographs(const CampaignObservations& observations, CampaignResult&
   for (std::size_t p = 0; p < result.photographs.size(); ++p) {
     MeasuredPhotograph& photograph = result.photographs[p];
     if (p < result.adjusted.photo_residuals.size()) photograph.residuals = result.adjusted.photo_residuals[p];
-    if (photograph.status != PhotoStatus::ok) continue;
+    if (!is_used(photograph.status)) continue;
     const std::vector<MarkerObservation>& markers = observations.photographs[p].seen.markers;
     if (known[p] == 0) {
       photograph.status = PhotoStatus::no_markers;
@@ -291,7 +305,7 @@ void judge_poses(const Campaign& campaign, const CampaignObservations& observati
       add_words(pose.words, result.adjusted.reason);
     }
     judge_pose(campaign, options, evidence, e, result, pose);
-    if (pose.status != PoseStatus::ok) pose.pose.reset();
+    if (!is_measured(pose.status)) pose.pose.reset();
   }
 }
 
@@ -374,8 +388,8 @@ void judge_swapped_folders(const std::vector<std::optional<Pose>>& targets, Camp
       if (kSwappedFitsBetter * (gap(i, j) + gap(j, i)) >= gap(i, i) + gap(j, j)) continue;
       result.warnings.push_back(fmt::format(
           "{} and {} look swapped: each lies where the other was commanded to", poses[i].id, poses[j].id));
-      add_words(poses[i].words, fmt::format("swapped with {}?", poses[j].id));
-      add_words(poses[j].words, fmt::format("swapped with {}?", poses[i].id));
+      suspect(poses[i], fmt::format("swapped with {}?", poses[j].id));
+      suspect(poses[j], fmt::format("swapped with {}?", poses[i].id));
     }
   }
 }

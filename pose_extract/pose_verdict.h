@@ -7,6 +7,11 @@ namespace hexcal {
 /// Two sources of the scale that differ by more disagree.
 inline constexpr double kScaleDisagreementSigmas = 3;
 
+/// Says of a measured pose, or of a photograph that was used, what contradicts it. One that failed stays as
+/// it is, with the words more.
+void suspect(MeasuredPose& pose, const std::string& words);
+void suspect(MeasuredPhotograph& photograph, const std::string& words);
+
 /// Status and words of each photograph after the adjustment.
 void judge_photographs(const CampaignObservations& observations, CampaignResult& result);
 
@@ -17,8 +22,9 @@ void judge_poses(const Campaign& campaign, const CampaignObservations& observati
 /// Warnings about the campaign: moved markers, bars that disagree, a camera that is not as calibrated.
 void judge_campaign(const Campaign& campaign, CampaignResult& result);
 
-/// Names the poses that lie where another was to be and it where they were, as after two folders' names were
-/// swapped. `targets` are the commanded poses in the order of result.poses; none where unknown.
+/// Names, as suspect, the poses that lie where another was to be and it where they were, as after two
+/// folders' names were swapped. `targets` are the commanded poses in the order of result.poses; none where
+/// unknown.
 void judge_swapped_folders(const std::vector<std::optional<Pose>>& targets, CampaignResult& result);
 
 }  // namespace hexcal

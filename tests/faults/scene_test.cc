@@ -136,7 +136,7 @@ TEST_F(FaultyScene, TwoPoseFoldersSwappedIsSaidWhenTheTargetsAreKnown) {
   const Outcome outcome = lab_.measure();
   FaultCampaign::expect_healthy(outcome, {"home", "p001"});
   EXPECT_THAT(outcome.out, HasSubstr("p002 and p003 look swapped"));
-  EXPECT_THAT(outcome.pose("p002").remarks, HasSubstr("swapped"));
+  EXPECT_THAT(outcome.pose("p002").status, HasSubstr("suspect: swapped"));
 }
 
 TEST_F(FaultyScene, NearlyOneDirectionIsSaidAndTheSigmaIsLarger) {

@@ -108,10 +108,17 @@ TEST(PoseTable, RoundTrip) {
   const PoseRecord good{"p1", "ok", Pose{{1, -2, 3.25}, {0.1, -0.2, 0.3}}, Vector6d::Constant(1e-3), 3,
                         18,   0.021};
   const PoseRecord bad{"p, 2", "too_few_markers: found 1", std::nullopt, std::nullopt, 1, 0, std::nullopt};
+  PoseRecord doubtful = good;
+  doubtful.id = "p3";
+  doubtful.status = "suspect: swapped with p4?";
   const fs::path path = folder.path() / "poses.csv";
-  write_file_atomically(path, format_pose_table("# head\n", {good, bad}, PoseColumns::measured));
+  write_file_atomically(path, format_pose_table("# head\n", {good, bad, doubtful}, PoseColumns::measured));
   const auto back = read_pose_table(path);
-  ASSERT_EQ(back.size(), 2U);
+  ASSERT_EQ(back.size(), 3U);
+  EXPECT_EQ(back[2].status, doubtful.status);
+  EXPECT_TRUE(is_suspect(back[2].status));
+  EXPECT_LE((back[2].pose->vector() - good.pose->vector()).norm(), 1e-6);
+  EXPECT_LE((*back[2].sigma - *good.sigma).norm(), 1e-6);
   EXPECT_EQ(back[0].id, "p1");
   EXPECT_LE((back[0].pose->vector() - good.pose->vector()).norm(), 1e-6);
   EXPECT_LE((*back[0].sigma - *good.sigma).norm(), 1e-6);
@@ -119,6 +126,16 @@ TEST(PoseTable, RoundTrip) {
   EXPECT_EQ(back[1].id, "p, 2");
   EXPECT_EQ(back[1].status, bad.status);
   EXPECT_FALSE(back[1].pose.has_value());
+}
+
+TEST(PoseTable, ASuspectPoseHasNumbers) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "poses.csv";
+  write_file_atomically(path,
+                        "pose,status,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\na,suspect: why,1,2,,0,0,0\n");
+  EXPECT_THAT([&] { (void)read_pose_table(path); }, ThrowsInputError("poses.csv:2: column 'z_mm'"));
+  EXPECT_FALSE(is_suspect("ok"));
+  EXPECT_FALSE(is_suspect("suspected of nothing"));
 }
 
 TEST(PoseTable, RefusesDuplicatesAndWords) {

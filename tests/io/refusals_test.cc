@@ -256,15 +256,21 @@ TEST(Refusals, OfPosesAndReadings) {
                "poses.csv:2: column 'pose': pose 'a' has no coordinate, wanted at least one");
   write_file_atomically(folder.path() / "failed.csv",
                         "pose,status,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\na,ok,10,0,0,0,2,0\n"
-                        "b,no_photographs,,,,,,\nc,ok,0,0,10,0,0,2\n");
+                        "b,no_photographs,,,,,,\nc,suspect: why,0,0,10,0,0,2\n");
   const ObservationFiles with_failed{.poses = folder.path() / "failed.csv",
                                      .targets = targets,
                                      .legs = std::nullopt,
                                      .covariance = std::nullopt};
   const ObservationTable table = read_observations(nominal, with_failed, {});
-  ASSERT_EQ(table.left_out.size(), 1U);
+  ASSERT_EQ(table.left_out.size(), 2U);
   EXPECT_EQ(table.left_out[0].id, "b");
   EXPECT_EQ(table.left_out[0].reason, "not measured: no_photographs");
+  EXPECT_EQ(table.left_out[1].reason, "suspect: why");
+  ObservationDefaults asked;
+  asked.with_suspect = true;
+  const ObservationTable with_suspect = read_observations(nominal, with_failed, asked);
+  ASSERT_EQ(with_suspect.observations.poses.size(), 2U);
+  EXPECT_EQ(with_suspect.observations.poses[1].id, "c");
   const auto scaled = [&](const char* mm, const char* deg, const std::string& words) {
     const fs::path path = folder.path() / "scaled.csv";
     write_file_atomically(

@@ -472,6 +472,9 @@ TEST(SwappedFolders, AreNamedOnlyWhereEachLiesAtTheOthersTarget) {
   EXPECT_EQ(swapped.poses[0].words, "");
   EXPECT_EQ(swapped.poses[1].words, "swapped with p2?");
   EXPECT_EQ(swapped.poses[2].words, "swapped with p1?");
+  EXPECT_EQ(swapped.poses[0].status, PoseStatus::ok);
+  EXPECT_EQ(swapped.poses[1].status, PoseStatus::suspect);
+  EXPECT_EQ(swapped.poses[2].status, PoseStatus::suspect);
   EXPECT_TRUE(judged(targets).warnings.empty());
   EXPECT_TRUE(judged({Pose{}, targets[2], std::nullopt}).warnings.empty());
 }

@@ -26,6 +26,16 @@ TEST(CampaignReport, JudgesEachPoseWithWords) {
   EXPECT_THAT(judgements[5].words, HasSubstr("sigma"));
 }
 
+TEST(CampaignReport, ASuspectPoseIsRedAndCountsInNoStatistic) {
+  CampaignReport report = sample_report();
+  report.poses[0].status = "suspect: swapped with pose_2?";
+  EXPECT_EQ(judge_poses(report.poses)[0].light, Light::bad);
+  EXPECT_THAT(judge_poses(report.poses)[0].words, HasSubstr("swapped with pose_2"));
+  EXPECT_EQ(campaign_verdict(report).light, Light::bad);
+  EXPECT_THAT(campaign_verdict(report).findings, ::testing::Contains(HasSubstr("swapped with pose_2")));
+  EXPECT_FALSE(paper_data(report).before.pairs[0].has_value());
+}
+
 TEST(CampaignReport, VerdictNamesTheFailedPoseAndTheNextStep) {
   const Verdict verdict = campaign_verdict(sample_report());
   EXPECT_THAT(verdict.findings, ::testing::Contains(HasSubstr("pose_3")));

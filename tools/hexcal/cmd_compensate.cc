@@ -35,6 +35,7 @@ struct CompensateFlags {
   double orientation_sigma_deg = 0;
   double tolerance_mm = 0;
   std::vector<std::string> fixed;
+  bool with_suspect = false;
   bool json = false;
 };
 
@@ -134,6 +135,7 @@ int run_compensate(CompensateFlags flags) {
   const PlatformGeometry nominal = read_hexapod_file(flags.hexapod);
   ObservationDefaults defaults;
   defaults.frames_known = flags.frames == "known";
+  defaults.with_suspect = flags.with_suspect;
   if (flags.position_sigma_mm > 0) defaults.position_sigma_mm = flags.position_sigma_mm;
   if (flags.orientation_sigma_deg > 0) defaults.orientation_sigma_deg = flags.orientation_sigma_deg;
   const ObservationFiles files{.poses = flags.poses,
@@ -155,8 +157,8 @@ int run_compensate(CompensateFlags flags) {
   }
   const CalibrationReport report = calibrate(nominal, table.observations, options);
   // The settings that a report of the campaign would use; others are no concern of its page.
-  const bool plain = flags.round == 1 && defaults.frames_known && flags.fixed.empty() &&
-                     flags.tolerance_mm <= 0 && !defaults.position_sigma_mm &&
+  const bool plain = flags.round == 1 && defaults.frames_known && !flags.with_suspect &&
+                     flags.fixed.empty() && flags.tolerance_mm <= 0 && !defaults.position_sigma_mm &&
                      !defaults.orientation_sigma_deg;
   if (plain && !flags.campaign.empty()) {
     const std::string key = calibration_key(kVersion, flags.hexapod, files, flags.method);
@@ -221,6 +223,8 @@ void add_compensate_command(CLI::App& app, Action& action) {
   command->add_option("--tolerance-mm", flags->tolerance_mm,
                       "trusted tolerance of joints and leg offsets (default: estimated)");
   command->add_option("--fix", flags->fixed, "parameter held at nominal, for instance 'leg 1 base x'");
+  command->add_flag("--with-suspect", flags->with_suspect,
+                    "use poses of status suspect too (measured, but something contradicts them)");
   command->add_flag("--json", flags->json, "machine-readable output");
   command->footer(
       "Prints all methods by the error that would remain after compensation at poses that were not used\n"

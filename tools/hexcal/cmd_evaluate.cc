@@ -36,6 +36,7 @@ struct EvaluatedTable {
   std::string label;
   PoseById poses;
   std::vector<std::string> without_pose;
+  std::vector<std::string> suspect;  // measured, but something contradicts them: left out
   std::vector<std::string> without_target;
   ErrorStatistics own;
   ErrorStatistics common;
@@ -47,6 +48,8 @@ EvaluatedTable read_table(const fs::path& path, const std::string& label, const 
   for (const PoseRecord& record : read_pose_table(path)) {
     if (!record.pose) {
       table.without_pose.push_back(record.id);
+    } else if (is_suspect(record.status)) {
+      table.suspect.push_back(record.id);
     } else if (targets.count(record.id) == 0) {
       table.without_target.push_back(record.id);
     } else {
@@ -137,11 +140,13 @@ int run_evaluate(const EvaluateFlags& flags) {
   bool some_failed = false;
   Json out;
   for (const EvaluatedTable& table : tables) {
-    some_failed = some_failed || !table.without_pose.empty() || !table.without_target.empty();
+    some_failed =
+        some_failed || !table.without_pose.empty() || !table.suspect.empty() || !table.without_target.empty();
     Json entry{{"table", table.label},
                {"own_poses", error_json(table.own)},
                {"common_poses", error_json(table.common)},
                {"without_pose", table.without_pose},
+               {"suspect", table.suspect},
                {"without_target", table.without_target}};
     if (&table != &tables[0]) {
       entry["improvement_own_poses"] = improvement_json(tables[0].own, table.own);
@@ -159,6 +164,8 @@ int run_evaluate(const EvaluateFlags& flags) {
   for (const EvaluatedTable& table : tables) {
     if (!table.without_pose.empty())
       fmt::print("{}: no pose for {}\n", table.label, fmt::join(table.without_pose, ", "));
+    if (!table.suspect.empty())
+      fmt::print("{}: suspect and left out: {}\n", table.label, fmt::join(table.suspect, ", "));
     if (!table.without_target.empty())
       fmt::print("{}: no target for {}\n", table.label, fmt::join(table.without_target, ", "));
   }

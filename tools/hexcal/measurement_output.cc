@@ -119,6 +119,7 @@ std::string measurement_text(const CampaignObservations& observations, const Cam
                    "sigma_mdeg", "photos", "markers", "rms_px", "status"});
   table.align_left(12);
   int bad = 0;
+  int suspects = 0;
   for (const MeasuredPose& pose : result.poses) {
     std::vector<std::string> cells{pose.id};
     const bool ok = pose.status == PoseStatus::ok;
@@ -139,8 +140,10 @@ std::string measurement_text(const CampaignObservations& observations, const Cam
     std::string words = status_text(pose);
     if (ok && !pose.words.empty()) words += " (" + pose.words + ")";
     cells.push_back(words);
-    table.add_row(std::move(cells), !ok ? Colour::bad : pose.words.empty() ? Colour::plain : Colour::warning);
+    const bool doubtful = pose.status == PoseStatus::suspect || (ok && !pose.words.empty());
+    table.add_row(std::move(cells), doubtful ? Colour::warning : ok ? Colour::plain : Colour::bad);
     bad += ok ? 0 : 1;
+    suspects += pose.status == PoseStatus::suspect ? 1 : 0;
   }
   if (!result.poses.empty()) out += table.text();
   const AdjustmentResult& adjusted = result.adjusted;
@@ -148,7 +151,7 @@ std::string measurement_text(const CampaignObservations& observations, const Cam
   std::size_t worst = 0;
   for (std::size_t p = 0; p < result.photographs.size(); ++p) {
     const MeasuredPhotograph& photograph = result.photographs[p];
-    if (photograph.status == PhotoStatus::ok) ++used;
+    if (is_used(photograph.status)) ++used;
     if (photograph.residuals.worst_px > result.photographs[worst].residuals.worst_px) worst = p;
     if (photograph.status != PhotoStatus::ok) {
       out += fmt::format("photograph {}: {}: {}\n", observations.photographs[p].seen.name,
@@ -162,9 +165,10 @@ std::string measurement_text(const CampaignObservations& observations, const Cam
   for (const MeasuredLength& bar : result.bars) out += length_line("bar", bar);
   for (const MeasuredLength& check : result.checks) out += length_line("check", check);
   for (const std::string& warning : result.warnings) out += fmt::format("warning: {}\n", warning);
-  out +=
-      fmt::format("{} of {} poses, {} of {} photographs", result.poses.size() - static_cast<std::size_t>(bad),
-                  result.poses.size(), used, result.photographs.size());
+  out += fmt::format("{} of {} poses{}, {} of {} photographs",
+                     result.poses.size() - static_cast<std::size_t>(bad), result.poses.size(),
+                     suspects > 0 ? fmt::format(" ({} more are suspect)", suspects) : "", used,
+                     result.photographs.size());
   if (!result.photographs.empty() && adjusted.redundancy_total > 0) {
     out += fmt::format(
         "; sigma0 {:.3f} at redundancy {:.0f}, rms {:.4f} px, worst corner {:.4f} px in {}; markers {}",

@@ -110,7 +110,7 @@ std::optional<std::filesystem::path> write_overlay(const OpenCampaign& open,
   }
   const MeasuredPhotograph& measured = result.photographs[photograph];
   draw_legend(
-      measured.status == PhotoStatus::ok
+      is_used(measured.status)
           ? fmt::format("{}: {} markers, {} rejected, rms {:.4f} px", entry.name, measured.residuals.markers,
                         measured.residuals.rejected, measured.residuals.rms_px)
           : fmt::format("{}: {}: {}", entry.name, photo_status_name(measured.status), measured.words),

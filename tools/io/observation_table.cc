@@ -187,8 +187,10 @@ ObservationTable read_observations(const PlatformGeometry& nominal, const Observ
     PoseObservation pose = read_row(table, row);
     if (pose.id.empty()) table.fail(row, "pose", "is empty, wanted a pose id");
     if (!seen.insert(pose.id).second) table.fail(row, "pose", fmt::format("pose '{}' stands twice", pose.id));
-    if (table.has_column("status") && table.text(row, "status") != "ok") {
-      out.left_out.push_back({pose.id, fmt::format("not measured: {}", table.text(row, "status"))});
+    const std::string status = table.has_column("status") ? table.text(row, "status") : "ok";
+    if (status != "ok" && !(is_suspect(status) && defaults.with_suspect)) {
+      out.left_out.push_back(
+          {pose.id, is_suspect(status) ? status : fmt::format("not measured: {}", status)});
       continue;
     }
     if (std::none_of(pose.observed.begin(), pose.observed.end(), [](bool one) { return one; }))

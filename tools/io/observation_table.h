@@ -22,6 +22,8 @@ struct ObservationDefaults {
   std::optional<double> orientation_sigma_deg;
   /// Whether measured and commanded poses share their frames, so that their sizes can be compared.
   bool frames_known = true;
+  /// Whether poses that something contradicts (status suspect) count too.
+  bool with_suspect = false;
 };
 
 struct ObservationTable {

@@ -33,6 +33,8 @@ std::optional<Vector6d> read_six(const CsvTable& table, std::size_t row,
 
 }  // namespace
 
+bool is_suspect(const std::string& status) { return status == "suspect" || status.starts_with("suspect:"); }
+
 std::vector<PoseRecord> read_pose_table(const std::filesystem::path& path) {
   const CsvTable table = CsvTable::read(path);
   std::vector<std::string> required{"pose"};
@@ -45,7 +47,8 @@ std::vector<PoseRecord> read_pose_table(const std::filesystem::path& path) {
     PoseRecord record;
     record.id = read_id(table, row, seen);
     if (table.has_column("status")) record.status = table.text(row, "status");
-    if (auto v = read_six(table, row, kPoseColumns, record.status != "ok")) {
+    const bool may_be_empty = record.status != "ok" && !is_suspect(record.status);
+    if (auto v = read_six(table, row, kPoseColumns, may_be_empty)) {
       v->tail<3>() *= kRadPerDeg;
       record.pose = Pose::from_vector(*v);
     }

@@ -20,7 +20,7 @@ inline constexpr std::array kPoseColumns{"x_mm", "y_mm", "z_mm", "roll_deg", "pi
 /// One row of targets.csv, poses.csv or predicted_poses.csv. Absent columns are absent here.
 struct PoseRecord {
   std::string id;
-  std::string status = "ok";      ///< "ok", or why there is no pose
+  std::string status = "ok";      ///< "ok", "suspect: why" with numbers, or why there is no pose
   std::optional<Pose> pose;       ///< absent when the row has no numbers (a failed pose)
   std::optional<Vector6d> sigma;  ///< mm and rad
   std::optional<int> images;
@@ -29,8 +29,11 @@ struct PoseRecord {
   std::string remarks{};  ///< what should be known of a pose that is ok
 };
 
+/// True of a status that begins with the word suspect: measured, but something contradicts it.
+[[nodiscard]] bool is_suspect(const std::string& status);
+
 /// Reads a pose table (columns pose,x_mm,...,yaw_deg and optional others). Duplicate ids are an error. A row
-/// whose status is not "ok" may leave its numbers empty; any other row must have all six.
+/// whose status is neither "ok" nor "suspect" may leave its numbers empty; any other row must have all six.
 [[nodiscard]] std::vector<PoseRecord> read_pose_table(const std::filesystem::path& path);
 
 enum class PoseColumns {

@@ -59,7 +59,8 @@ Rows6 sigmas_of(const Measurement& measurement) {
 void bind_measurement(py::module_& module) {
   py::class_<Measurement>(module, "Measurement", "Measured poses of a campaign, a row per pose.")
       .def_readonly("ids", &Measurement::ids, "Names of the poses' folders.")
-      .def_readonly("status", &Measurement::status, "'ok', or the name of what is wrong.")
+      .def_readonly("status", &Measurement::status,
+                    "'ok', 'suspect' (measured, but something contradicts it), or the name of what is wrong.")
       .def_readonly("words", &Measurement::words, "Why a pose is not ok, or what should be known of it.")
       .def_readonly("poses", &Measurement::poses, "(N, 6), mm and deg, NaN where there is none.")
       .def_property_readonly(

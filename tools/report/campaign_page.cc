@@ -51,8 +51,9 @@ PaperData paper_data(const CampaignReport& report) {
     if (target == targets.end()) continue;
     data.pose_ids.push_back(record.id);
     data.sigma.push_back(record.sigma);
-    data.before.pairs.push_back(record.pose ? std::optional(PosePair{target->second, *record.pose})
-                                            : std::nullopt);
+    data.before.pairs.push_back(record.pose && !is_suspect(record.status)
+                                    ? std::optional(PosePair{target->second, *record.pose})
+                                    : std::nullopt);
   }
   if (report.compensation) {
     for (const CrossValidation& method : report.compensation->calibration.comparison.methods) {

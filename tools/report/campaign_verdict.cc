@@ -53,10 +53,14 @@ const CrossValidation* chosen_method(const CampaignReport& report) {
 // What measuring alone says.
 void judge_measurement(const CampaignReport& report, Verdict& verdict) {
   const std::vector<PoseJudgement> judgements = judge_poses(report.poses);
-  std::vector<std::string> failed, weak;
+  std::vector<std::string> failed, suspects, weak;
   for (std::size_t i = 0; i < judgements.size(); ++i) {
     const std::string& id = report.poses[i].id;
-    if (judgements[i].light == Light::bad) failed.push_back(id);
+    if (is_suspect(report.poses[i].status)) {
+      suspects.push_back(fmt::format("{} ({})", id, report.poses[i].status));
+    } else if (judgements[i].light == Light::bad) {
+      failed.push_back(id);
+    }
     if (judgements[i].light == Light::warning)
       weak.push_back(fmt::format("{} ({})", id, judgements[i].words));
   }
@@ -67,6 +71,14 @@ void judge_measurement(const CampaignReport& report, Verdict& verdict) {
     verdict.next_steps.push_back(
         fmt::format("Retake the photographs of {} and run `hexcal measure` again.", listed(failed)));
   }
+  if (!suspects.empty()) {
+    verdict.findings.push_back(fmt::format("{} measured, but something contradicts {}: {}.",
+                                           pose_count(suspects.size()), suspects.size() == 1 ? "it" : "them",
+                                           listed(suspects)));
+    verdict.next_steps.emplace_back(
+        "Find out what contradicts the suspect poses before the results are used: no compensation counts "
+        "them.");
+  }
   if (!weak.empty()) {
     verdict.findings.push_back(
         fmt::format("{} measured with reservations: {}.", pose_count(weak.size()), listed(weak)));
@@ -75,6 +87,7 @@ void judge_measurement(const CampaignReport& report, Verdict& verdict) {
         "different sides.");
   }
   verdict.light = failed.empty() && weak.empty() ? Light::good : Light::warning;
+  if (!suspects.empty()) verdict.light = Light::bad;
   if (2 * failed.size() > count) verdict.light = Light::bad;
   verdict.headline = fmt::format(
       "{} of {} measured, typically to {} mm and {} deg (one standard deviation).", count - failed.size(),
@@ -94,7 +107,7 @@ void judge_network(const NetworkPart& network, Verdict& verdict) {
   if (!network.warnings.empty()) verdict.light = std::max(verdict.light, Light::warning);
   std::vector<std::string> unused;
   for (const PhotographPart& photograph : network.photographs) {
-    if (photograph.status != "ok") unused.push_back(photograph.name);
+    if (photograph.status != "ok" && !is_suspect(photograph.status)) unused.push_back(photograph.name);
   }
   if (!unused.empty()) {
     verdict.findings.push_back(fmt::format("{} of {} photographs were not used: {}.", unused.size(),
@@ -183,6 +196,8 @@ std::vector<PoseJudgement> judge_poses(const std::vector<PoseRecord>& poses) {
   for (const PoseRecord& record : poses) {
     PoseJudgement judgement{Light::good, ""};
     if (!record.pose) {
+      judgement = {Light::bad, status_text(record.status)};
+    } else if (is_suspect(record.status)) {
       judgement = {Light::bad, status_text(record.status)};
     } else if (record.status != "ok") {
       judgement = {Light::warning, status_text(record.status)};

@@ -33,10 +33,14 @@ std::string base64(const std::string& bytes) {
   return out;
 }
 
+bool is_used(const PhotographPart& photograph) {
+  return photograph.status == "ok" || is_suspect(photograph.status);
+}
+
 double typical_rms_px(const NetworkPart& network) {
   std::vector<double> values;
   for (const PhotographPart& photograph : network.photographs) {
-    if (photograph.status == "ok") values.push_back(photograph.rms_px);
+    if (is_used(photograph)) values.push_back(photograph.rms_px);
   }
   return median(std::move(values));
 }
@@ -100,7 +104,7 @@ Html photograph_figure(const PhotographPart& photograph, double stretch, const s
     svg.insert(svg.find("</title>") + 8, image);
   }
   std::string caption = photograph.name;
-  if (photograph.status == "ok") {
+  if (is_used(photograph)) {
     caption +=
         fmt::format(": {} markers, {} px rms", photograph.markers, significant_text(photograph.rms_px, 2));
   }
@@ -121,7 +125,7 @@ HtmlTable photograph_table(const NetworkPart& network) {
     const std::string words = look_words(photograph, typical);
     HtmlCell verdict = text_cell(words.empty() ? "good" : words, photograph_light(photograph, words));
     verdict.sort_key = static_cast<double>(verdict.light);
-    const bool used = photograph.status == "ok";
+    const bool used = is_used(photograph);
     table.rows.push_back({text_cell(photograph.name), text_cell(photograph.pose_id),
                           number_cell(photograph.markers, 0), number_cell(photograph.rejected, 0),
                           number_cell(used ? photograph.rms_px : kNoNumber, 4), verdict});
