@@ -10,6 +10,7 @@
 #include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/sheet_file.h"
+#include "tools/synthetic/camera_effects_file.h"
 #include "tools/synthetic/campaign_folder.h"
 #include "tools/synthetic/simulation_file.h"
 
@@ -28,6 +29,7 @@ struct SimulateFlags {
   std::optional<double> pose_noise_um;
   std::optional<double> pose_noise_mdeg;
   fs::path sheet;
+  std::string effects = "ideal";
   bool no_images = false;
   bool true_camera = false;
 };
@@ -50,6 +52,7 @@ int run_simulate(const SimulateFlags& flags) {
     }
     options.sheet = sheets.front();
   }
+  options.effects = read_camera_effects(flags.effects);
   RoundOptions round;
   round.images = !flags.no_images;
   round.true_camera = flags.true_camera;
@@ -156,6 +159,10 @@ void add_simulate_command(CLI::App& app, Action& action) {
   command->add_option("--blur-min-px", options.blur_min_px, "sigma of the sharpest photograph")
       ->capture_default_str();
   command->add_option("--blur-max-px", options.blur_max_px, "sigma of the softest photograph")
+      ->capture_default_str();
+  command
+      ->add_option("--camera-effects", flags->effects,
+                   "what is real about print, lens and camera: ideal, d3200, or a YAML file")
       ->capture_default_str();
   command->add_option("--jpeg-quality", options.jpeg.quality, "1 to 100")->capture_default_str();
   command->add_flag("--grey", options.jpeg.grey, "one-channel JPEG");

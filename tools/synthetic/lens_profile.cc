@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <tuple>
 
 #include "kinematics/geometry/input_error.h"
 
@@ -24,16 +25,36 @@ constexpr std::array<PtLensTerms, 6> kTerms{{{18, .02437, -.06486, .00154},
                                              {105, -.00026, .02117, -.02621}}};
 constexpr double kProfileCrop = 1.534;
 
-PtLensTerms terms_at(double focal_mm) {
-  if (!(focal_mm >= kTerms.front().focal_mm && focal_mm <= kTerms.back().focal_mm)) {
+struct LateralColourTerms {
+  double focal_mm, red_b, red_v, blue_b, blue_v;
+};
+
+// The same lens, tca model poly3.
+constexpr std::array<LateralColourTerms, 6> kLateralColour{{{18, .0000278, 1.0005774, -.0000782, 1.0002245},
+                                                            {24, .0000228, 1.0003575, -.0000433, 1.0002590},
+                                                            {35, -.0000268, 1.0001459, .0000296, 1.0002736},
+                                                            {50, -.0000121, .9999792, -.0000053, 1.0002278},
+                                                            {70, -.0000235, .9998510, -.0000448, 1.0001296},
+                                                            {105, .0000014, .9996695, -.0000464, .9998467}}};
+
+// The profile's unit of radius: half the short side of its calibration sensor.
+double profile_unit_mm() { return std::hypot(36.0, 24.0) / kProfileCrop / std::hypot(1.5, 1.0) / 2; }
+
+// The two entries of a table around a focal length, and how far it lies between them.
+template <typename Table>
+auto entries_around(const Table& table, double focal_mm) {
+  if (!(focal_mm >= table.front().focal_mm && focal_mm <= table.back().focal_mm)) {
     throw InputError(fmt::format("focal length {} mm: the lens profile reaches from 18 to 105 mm", focal_mm));
   }
-  const auto upper = std::find_if(kTerms.begin() + 1, kTerms.end() - 1,
-                                  [&](const PtLensTerms& terms) { return terms.focal_mm >= focal_mm; });
-  const PtLensTerms& low = *(upper - 1);
-  const PtLensTerms& high = *upper;
-  const double w = (focal_mm - low.focal_mm) / (high.focal_mm - low.focal_mm);
-  const auto mix = [&](double a, double b) {
+  const auto upper = std::find_if(table.begin() + 1, table.end() - 1,
+                                  [&](const auto& entry) { return entry.focal_mm >= focal_mm; });
+  const auto& low = *(upper - 1);
+  return std::tuple(low, *upper, (focal_mm - low.focal_mm) / (upper->focal_mm - low.focal_mm));
+}
+
+PtLensTerms terms_at(double focal_mm) {
+  const auto [low, high, w] = entries_around(kTerms, focal_mm);
+  const auto mix = [&, low = low, high = high, w = w](double a, double b) {
     return ((1 - w) * a * low.focal_mm + w * b * high.focal_mm) / focal_mm;
   };
   return {focal_mm, mix(low.a, high.a), mix(low.b, high.b), mix(low.c, high.c)};
@@ -58,15 +79,26 @@ CameraModel profile_camera(double focal_mm, int width_px) {
   const PtLensTerms terms = terms_at(focal_mm);
   const double d = 1 - terms.a - terms.b - terms.c;
   const double paraxial_mm = focal_mm * d;
-  // The profile's unit of radius: half the short side of its calibration sensor.
-  const double unit_mm = std::hypot(36.0, 24.0) / kProfileCrop / std::hypot(1.5, 1.0) / 2;
-  const double ratio = paraxial_mm / unit_mm;
+  const double ratio = paraxial_mm / profile_unit_mm();
   CameraModel camera(width_px, frame_height_px(width_px), paraxial_mm * width_px / kSensorWidthMm,
                      LensModel::radial);
   camera.parameters[4] = terms.c * ratio / (d * d);
   camera.parameters[5] = terms.b * ratio * ratio / (d * d * d);
   camera.parameters[6] = terms.a * ratio * ratio * ratio / (d * d * d * d);
   return camera;
+}
+
+LateralColour profile_lateral_colour(double focal_mm, int width_px) {
+  const auto [low, high, w] = entries_around(kLateralColour, focal_mm);
+  const auto mix = [w = w](double a, double b) { return (1 - w) * a + w * b; };
+  const auto mix_b = [&, low = low, high = high](double a, double b) {
+    return mix(a * low.focal_mm, b * high.focal_mm) / focal_mm;
+  };
+  LateralColour colour;
+  colour.unit_px = profile_unit_mm() * width_px / kSensorWidthMm;
+  colour.v = {mix(low.red_v, high.red_v), 1, mix(low.blue_v, high.blue_v)};
+  colour.b = {mix_b(low.red_b, high.red_b), 0, mix_b(low.blue_b, high.blue_b)};
+  return colour;
 }
 
 CameraModel brown_camera(double focal_mm, int width_px) {

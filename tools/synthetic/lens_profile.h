@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <vector>
 
 #include "photogrammetry/camera/camera_model.h"
@@ -21,6 +22,17 @@ inline constexpr int kSensorHeightPx = 4000;
 /// holds exactly. The principal point is the middle of the frame. Between the profile's focal lengths the
 /// terms times focal length are interpolated linearly. Throws InputError outside 18 to 105 mm.
 [[nodiscard]] CameraModel profile_camera(double focal_mm, int width_px);
+
+/// Where a colour falls that green puts at distance r from the principal point: r (v + b r^2), r in
+/// `unit_px`.
+struct LateralColour {
+  double unit_px = 1;
+  std::array<double, 3> v{1, 1, 1};  ///< red, green, blue
+  std::array<double, 3> b{0, 0, 0};
+};
+
+/// Of the public profile (lensfun, tca poly3), between its focal lengths as profile_camera().
+[[nodiscard]] LateralColour profile_lateral_colour(double focal_mm, int width_px);
 
 /// Brown-Conrady camera of about the same size of distortion.
 [[nodiscard]] CameraModel brown_camera(double focal_mm, int width_px);

@@ -5,49 +5,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
-#include <opencv2/imgproc.hpp>
 
 #include "kinematics/geometry/input_error.h"
-#include "tools/synthetic/random_source.h"
+#include "tools/synthetic/sensor_noise.h"
 #include "tools/synthetic/tile_renderer.h"
 
 namespace hexcal {
 namespace {
 
 constexpr int kToneSteps = 65536;
-constexpr int kQuantiles = 4096;
-
-// Quantiles of the unit normal distribution, scaled to unit variance: a random index is a normal number.
-const std::vector<float>& normal_quantiles() {
-  static const std::vector<float> quantiles = [] {
-    std::vector<double> z(kQuantiles);
-    double square = 0;
-    for (int i = 0; i < kQuantiles; ++i) {
-      const double p = (i + 0.5) / kQuantiles;
-      double x = 0;
-      for (int iteration = 0; iteration < 60; ++iteration) {
-        const double error = 0.5 * std::erfc(-x / std::sqrt(2.0)) - p;
-        const double step = error / (std::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi));
-        x -= std::clamp(step, -0.5, 0.5);
-      }
-      z[static_cast<std::size_t>(i)] = x;
-      square += x * x;
-    }
-    std::vector<float> scaled(kQuantiles);
-    for (std::size_t i = 0; i < scaled.size(); ++i) {
-      scaled[i] = static_cast<float>(z[i] / std::sqrt(square / kQuantiles));
-    }
-    return scaled;
-  }();
-  return quantiles;
-}
-
-void sharpen(cv::Mat& photograph, double strength) {
-  cv::Mat smooth;
-  cv::GaussianBlur(photograph, smooth, {0, 0}, 1.0);
-  cv::addWeighted(photograph, 1 + strength, smooth, -strength, 0, photograph);
-}
 
 }  // namespace
 
@@ -73,6 +39,7 @@ SensorImage render(const Scene& scene, const RayLattice& lens, const Rigid3& cam
   SensorImage image;
   image.light.create(camera.height_px, camera.width_px, CV_32FC1);
   image.tint.create(camera.height_px, camera.width_px, CV_8UC1);
+  if (options.depth) image.depth_mm.create(image.light.size(), CV_32FC1);
   for (const Surface& surface : scene.surfaces) image.tints.push_back(surface.tint);
   if (image.tints.empty()) image.tints.push_back({1, 1, 1});
   const TileRenderer renderer(scene, lens, camera_from_world, options, seed);
@@ -119,29 +86,23 @@ cv::Mat develop(const SensorImage& image, const SensorOptions& options, std::uin
     tone[static_cast<std::size_t>(i)] =
         static_cast<std::uint8_t>(std::lround(255 * toned(options.tone, i / (kToneSteps - 1.0))));
   }
-  const auto& normal = normal_quantiles();
-  const auto shot = static_cast<float>(options.full_well_electrons > 0 ? 1 / options.full_well_electrons : 0);
-  const auto read = static_cast<float>(options.read_noise * options.read_noise);
-  const std::uint64_t key = mixed_bits(seed ^ 0xD1CEULL);
+  const SensorNoise noise(options, seed);
   cv::Mat photograph(image.light.size(), CV_8UC3);
   tbb::parallel_for(0, image.light.rows, [&](int y) {
     const float* light = image.light.ptr<float>(y);
     const std::uint8_t* tint = image.tint.ptr<std::uint8_t>(y);
     std::uint8_t* to = photograph.ptr<std::uint8_t>(y);
     for (int x = 0; x < image.light.cols; ++x) {
-      const std::uint64_t random =
-          mixed_bits(key ^ (static_cast<std::uint64_t>(y) << 32U | static_cast<std::uint64_t>(x)));
+      const std::uint64_t random = noise.random(x, y);
       const auto& colour = image.tints[tint[x]];
       for (std::size_t channel = 0; channel < 3; ++channel) {
         const float v = light[x] * colour[channel] * options.white_balance[channel];
-        const float noise = normal[random >> (12 * channel) & (kQuantiles - 1)];
-        const float noisy = v + std::sqrt(shot * v + read) * noise;
+        const float noisy = noise.added(v, random, channel);
         const float step = std::clamp(noisy, 0.0F, 1.0F) * (kToneSteps - 1) + 0.5F;
         to[3 * x + 2 - static_cast<int>(channel)] = tone[static_cast<std::size_t>(step)];
       }
     }
   });
-  if (options.sharpening > 0) sharpen(photograph, options.sharpening);
   return photograph;
 }
 

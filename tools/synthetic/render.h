@@ -28,12 +28,14 @@ struct SensorImage {
   cv::Mat light;                            ///< CV_32FC1
   cv::Mat tint;                             ///< CV_8UC1, index into tints
   std::vector<std::array<float, 3>> tints;  ///< red, green, blue factor
+  cv::Mat depth_mm;                         ///< CV_32FC1, along the camera's z, where asked for
 };
 
 struct OpticsOptions {
   double blur_px = 0.8;                                  ///< standard deviation of the Gaussian point spread
   double exposure = 1.0;                                 ///< factor on all light
   std::array<double, 3> vignetting{-0.40, 0.41, -0.23};  ///< of r^2, r^4, r^6; r = 1 in the frame's corner
+  bool depth = false;                                    ///< also SensorImage::depth_mm
   void validate() const;
 };
 
@@ -45,7 +47,7 @@ struct OpticsOptions {
 
 enum class ToneCurveKind { srgb, gamma22, s_curve, linear };
 
-/// What the sensor and the camera's processing make of the light. The noise of a pixel in linear light v (1 =
+/// An ideal sensor and processing (camera_effects.h: real ones). The noise of a pixel in linear light v (1 =
 /// clipping) has the variance v / full_well_electrons + read_noise^2, independent between pixels and
 /// channels.
 struct SensorOptions {
@@ -53,7 +55,6 @@ struct SensorOptions {
   double read_noise = 0.0008;                              ///< standard deviation, 1 = clipping
   std::array<float, 3> white_balance{1.02F, 1.0F, 0.95F};  ///< red, green, blue
   ToneCurveKind tone = ToneCurveKind::srgb;
-  double sharpening = 0;  ///< strength of an unsharp mask in the processed image (a camera's own), 0: none
   void validate() const;
 };
 

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include "kinematics/geometry/input_error.h"
+#include "tools/synthetic/camera_body.h"
+#include "tools/synthetic/lens_effects.h"
 #include "tools/synthetic/random_source.h"
 #include "tools/synthetic/stations.h"
 
@@ -13,6 +15,7 @@ namespace {
 constexpr std::uint64_t kCameraStream = 10;
 constexpr std::uint64_t kStationStream = 11;
 constexpr std::uint64_t kShotStream = 12;
+constexpr std::uint64_t kTrembleStream = 13;
 
 template <typename Number>
 void check_range(const char* name, Number value, Number low, Number high) {
@@ -37,8 +40,46 @@ Shot new_shot(const VirtualLaboratory& laboratory, RandomSource& random, const R
   shot.exposure = random.uniform(0.92, 1.08);
   shot.seed = random.bits();
   shot.tags.focal_mm = laboratory.options.focal_mm;
+  if (laboratory.options.effects.lens.f_number > 0)
+    shot.tags.f_number = laboratory.options.effects.lens.f_number;
   shot.tags.capture_time = capture_time(9 * number);
   return shot;
+}
+
+// Turns and moves the platform about LG's origin. A stream of its own leaves all other draws as they are.
+Rigid3 trembled(const Rigid3& UG_from_LG, const PlatformEffects& effects, std::uint64_t shot_seed) {
+  if (effects == PlatformEffects{}) return UG_from_LG;
+  RandomSource random(shot_seed, kTrembleStream);
+  Eigen::Vector3d shift_mm;
+  Eigen::Vector3d turn_rad;
+  for (Eigen::Index i = 0; i < 3; ++i) shift_mm[i] = effects.tremble_mm * random.normal();
+  for (Eigen::Index i = 0; i < 3; ++i) turn_rad[i] = 1e-3 * effects.tremble_mrad * random.normal();
+  return UG_from_LG * Rigid3(quaternion_from_rotation_vector(turn_rad), shift_mm);
+}
+
+// What was printed comes first in a scene: the sheet or the stickers.
+std::size_t printed_surfaces(const VirtualLaboratory& laboratory, const Shot& shot) {
+  return shot.pose.empty() ? 1 : laboratory.rig.stickers.size();
+}
+
+// Mean distance along the camera's axis of the prints that face it.
+double prints_distance_mm(const Scene& scene, std::size_t count, const Rigid3& camera_from_world) {
+  double sum = 0;
+  int facing = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Rigid3 pose = camera_from_world * scene.surfaces[i].world_from_surface;
+    if (pose.translation.dot(pose.rotation * Eigen::Vector3d::UnitZ()) >= 0) continue;
+    sum += pose.translation.z();
+    ++facing;
+  }
+  return facing > 0 ? sum / facing : 1000;
+}
+
+void print_on_paper(Scene& scene, std::size_t count, const PrintEffects& effects) {
+  for (std::size_t i = 0; i < count; ++i) {
+    scene.surfaces[i].ink_spread_mm = effects.ink_spread_mm;
+    scene.surfaces[i].gloss = static_cast<float>(effects.sticker_gloss);
+  }
 }
 
 }  // namespace
@@ -70,6 +111,7 @@ void SimulationOptions::validate() const {
   machine.validate();
   sheet.validate();
   sensor.validate();
+  effects.validate();
 }
 
 VirtualLaboratory make_laboratory(const SimulationOptions& options) {
@@ -99,7 +141,8 @@ std::vector<Shot> pose_shots(const VirtualLaboratory& laboratory, const std::vec
     for (const Rigid3& station : pose_stations(place, laboratory.options.photos_per_pose, distance)) {
       Shot shot = new_shot(laboratory, random, station, number++);
       shot.pose = pose.id;
-      shot.UG_from_LG = ug_from_lg(pose.pose, laboratory.machine.nominal.gd_mm);
+      shot.UG_from_LG = trembled(ug_from_lg(pose.pose, laboratory.machine.nominal.gd_mm),
+                                 laboratory.options.effects.platform, shot.seed);
       shots.push_back(shot);
     }
   }
@@ -120,8 +163,13 @@ std::vector<Shot> calibration_shots(const VirtualLaboratory& laboratory, int fir
 }
 
 Scene shot_scene(const VirtualLaboratory& laboratory, const Shot& shot) {
+  const PrintEffects& effects = laboratory.options.effects.print;
   if (shot.pose.empty()) {
-    return sheet_scene(laboratory.options.sheet, laboratory.options.print, laboratory.options.seed);
+    SheetPrint print = laboratory.options.print;
+    print.warp_mm.x() += effects.sheet_curl_mm;
+    Scene scene = sheet_scene(laboratory.options.sheet, print, laboratory.options.seed);
+    print_on_paper(scene, printed_surfaces(laboratory, shot), effects);
+    return scene;
   }
   Rig rig = laboratory.rig;
   for (Sticker& sticker : rig.stickers) {
@@ -130,17 +178,34 @@ Scene shot_scene(const VirtualLaboratory& laboratory, const Shot& shot) {
     }
   }
   Scene scene = rig_scene(rig, shot.UG_from_LG);
+  print_on_paper(scene, printed_surfaces(laboratory, shot), effects);
+  if (effects.sticker_curl_mm != 0) {
+    for (std::size_t i = 0; i < rig.stickers.size(); ++i) {
+      const double half = 0.5 * rig.stickers[i].size_mm;
+      scene.surfaces[i].warp = SheetWarp{{effects.sticker_curl_mm, 0}, {half, half}};
+    }
+  }
   scene.surfaces.insert(scene.surfaces.end(), shot.obstacles.begin(), shot.obstacles.end());
   return scene;
 }
 
 cv::Mat photograph(const VirtualLaboratory& laboratory, const RayLattice& lens, const Shot& shot) {
+  const SimulationOptions& options = laboratory.options;
+  const CameraEffects& effects = options.effects;
   OpticsOptions optics;
   optics.blur_px = shot.blur_px;
-  optics.exposure = shot.exposure;
-  const SensorImage light =
-      render(shot_scene(laboratory, shot), lens, shot.camera_from_world, optics, shot.seed);
-  return develop(light, laboratory.options.sensor, shot.seed);
+  optics.exposure = shot.exposure * effects.sensor.exposure;
+  optics.depth = effects.lens.f_number > 0;
+  const Scene scene = shot_scene(laboratory, shot);
+  SensorImage light = render(scene, lens, shot.camera_from_world, optics, shot.seed);
+  if (effects.ideal()) return develop(light, options.sensor, shot.seed);
+  const double focus_mm =
+      effects.lens.focus_mm > 0
+          ? effects.lens.focus_mm
+          : prints_distance_mm(scene, printed_surfaces(laboratory, shot), shot.camera_from_world);
+  apply_lens_effects(light, effects.lens, options.focal_mm, focus_mm, shot.seed);
+  const ChannelShift shift(effects.lens, laboratory.camera, options.focal_mm, shot.seed);
+  return develop(light, shift, options.sensor, effects.sensor, effects.processing, shot.seed, options.seed);
 }
 
 }  // namespace hexcal

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "camera_calib/sheet.h"
+#include "tools/synthetic/camera_effects.h"
 #include "tools/synthetic/grips.h"
 #include "tools/synthetic/jpeg_file.h"
 #include "tools/synthetic/lens_profile.h"
@@ -35,6 +36,7 @@ struct SimulationOptions {
   double blur_min_px = 0.6;  ///< each photograph draws its blur between these
   double blur_max_px = 1.0;
   SensorOptions sensor;
+  CameraEffects effects;  ///< what is real about print, platform, lens, sensor and processing
   JpegOptions jpeg;
 
   SimulationOptions();
@@ -64,7 +66,7 @@ struct MovedSticker {
 struct Shot {
   std::string pose;          ///< id and so the folder; empty for a photograph of the sheet
   std::string file;          ///< DSC_0001.jpg
-  Rigid3 UG_from_LG;         ///< where the moving grip stands
+  Rigid3 UG_from_LG;         ///< where the moving grip stands, trembling (PlatformEffects) included
   Rigid3 camera_from_world;  ///< world: UG, or the sheet's frame
   double blur_px = 0.8;
   double exposure = 1;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "tools/io/yaml_map.h"
+#include "tools/synthetic/camera_effects_file.h"
 
 namespace hexcal {
 namespace {
@@ -30,11 +31,12 @@ std::string format_simulation_file(const std::string& head, const SimulationOpti
       o.machine.joint_sigma_mm, o.machine.leg_offset_sigma_mm, o.machine.leg_scale_sigma, o.machine.draws,
       o.machine.stroke_wave_mm, o.machine.backlash_mm, o.machine.leg_compliance_mm_per_n,
       o.machine.payload_n);
-  text += fmt::format("sensor: {{full_well_electrons: {}, read_noise: {}, tone: {}, sharpening: {}}}\n",
+  text += fmt::format("sensor: {{full_well_electrons: {}, read_noise: {}, tone: {}}}\n",
                       o.sensor.full_well_electrons, o.sensor.read_noise,
-                      kToneNames[static_cast<std::size_t>(o.sensor.tone)], o.sensor.sharpening);
+                      kToneNames[static_cast<std::size_t>(o.sensor.tone)]);
   text += fmt::format("print: {{scale: [{}, {}], warp_mm: [{}, {}], margin_mm: {}}}\n", o.print.scale.x(),
                       o.print.scale.y(), o.print.warp_mm.x(), o.print.warp_mm.y(), o.print.margin_mm);
+  if (!o.effects.ideal()) text += "camera_effects:\n" + format_camera_effects(o.effects, "  ");
   return text;
 }
 
@@ -81,7 +83,7 @@ SimulationOptions read_simulation_file(const std::filesystem::path& path) {
   for (std::size_t i = 0; i < kToneNames.size(); ++i) {
     if (tone == kToneNames[i]) o.sensor.tone = static_cast<ToneCurveKind>(i);
   }
-  o.sensor.sharpening = sensor.number("sharpening");
+  o.effects.processing.sharpening = sensor.number_or("sharpening", 0);  // older files
   sensor.finish();
   const YamlMap print = map.map("print");
   const std::vector<double> scale = print.numbers("scale", 2);
@@ -90,6 +92,7 @@ SimulationOptions read_simulation_file(const std::filesystem::path& path) {
   o.print.warp_mm = {warp[0], warp[1]};
   o.print.margin_mm = print.number("margin_mm");
   print.finish();
+  if (map.has("camera_effects")) o.effects = camera_effects_of(map.map("camera_effects"));
   map.finish();
   return o;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace hexcal {
 namespace {
@@ -86,7 +87,11 @@ std::vector<Eigen::Vector2d> rectangle_outline(double half_width_mm, double half
           {-half_width_mm, half_height_mm}};
 }
 
-SurfacePaint::SurfacePaint(const Surface& surface) : base_albedo_(surface.albedo), decals_(surface.decals) {
+SurfacePaint::SurfacePaint(const Surface& surface)
+    : base_albedo_(surface.albedo),
+      darkest_(surface.albedo),
+      ink_spread_mm_(surface.ink_spread_mm),
+      decals_(surface.decals) {
   const std::size_t count = surface.outline_mm.size();
   for (std::size_t i = 0; i < count; ++i) {
     const Eigen::Vector2d& a = surface.outline_mm[i];
@@ -101,6 +106,11 @@ SurfacePaint::SurfacePaint(const Surface& surface) : base_albedo_(surface.albedo
     const Eigen::Vector2d high(end.x(), decals_[i].top_left_mm.y());
     low_ = i == 0 ? low : Eigen::Vector2d(low_.cwiseMin(low));
     high_ = i == 0 ? high : Eigen::Vector2d(high_.cwiseMax(high));
+  }
+  for (const Decal& decal : decals_) {
+    for (const float albedo : decal.albedo) {
+      if (albedo >= 0) darkest_ = std::min(darkest_, albedo);
+    }
   }
   if (decals_.empty()) return;
   bins_per_mm_ = (kBins * Eigen::Vector2d::Ones()).cwiseQuotient(high_ - low_);
@@ -126,6 +136,21 @@ bool SurfacePaint::inside(const Eigen::Vector2d& p) const {
 }
 
 float SurfacePaint::albedo(const Eigen::Vector2d& p) const {
+  float albedo = drawn_albedo(p);
+  if (ink_spread_mm_ <= 0 || albedo <= darkest_) return albedo;
+  if (drawn_footprint(p.array() - ink_spread_mm_, p.array() + ink_spread_mm_).cover == Cover::uniform)
+    return albedo;
+  // Ink grows by a disc: exact along straight edges, an octagon at corners.
+  const double s = ink_spread_mm_;
+  const double d = s / std::numbers::sqrt2;
+  for (const Eigen::Vector2d& way :
+       {Eigen::Vector2d(s, 0), {-s, 0}, {0, s}, {0, -s}, {d, d}, {d, -d}, {-d, d}, {-d, -d}}) {
+    albedo = std::min(albedo, drawn_albedo(p + way));
+  }
+  return albedo;
+}
+
+float SurfacePaint::drawn_albedo(const Eigen::Vector2d& p) const {
   if (decals_.empty()) return base_albedo_;
   const auto& near =
       bins_[static_cast<std::size_t>(bin_index(p.y(), 1) * kBins + bin_index(p.x(), 0))].decals;
@@ -147,6 +172,11 @@ Footprint SurfacePaint::footprint(const Eigen::Vector2d& low, const Eigen::Vecto
     inside = inside && x_near + y_near + edge.z() >= 0;
   }
   if (!inside) return {Cover::partly, 0};
+  // Ink may reach into the rectangle from so far around it.
+  return drawn_footprint(low.array() - ink_spread_mm_, high.array() + ink_spread_mm_);
+}
+
+Footprint SurfacePaint::drawn_footprint(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const {
   if (decals_.empty()) return {Cover::uniform, base_albedo_};
   const int x0 = bin_index(low.x(), 0);
   const int x1 = bin_index(high.x(), 0);

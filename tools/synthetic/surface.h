@@ -41,6 +41,8 @@ struct Surface {
   double grain_mm = 1;                 ///< size of one texel of that texture
   bool background = false;             ///< its edges need no exact sampling
   std::vector<Decal> decals;           ///< a later one lies over an earlier one
+  float gloss = 0;                     ///< of the lamp's light, mirrored in the middle of the highlight
+  double ink_spread_mm = 0;            ///< the darker of two neighbours reaches this far over their border
   Eigen::Vector2d print_scale{1, 1};   ///< the print is this much larger than drawn, about the origin
   std::optional<SheetWarp> warp;
 
@@ -74,8 +76,13 @@ class SurfacePaint {
     std::vector<int> decals;
   };
   [[nodiscard]] int bin_index(double coordinate, int axis) const;
+  [[nodiscard]] float drawn_albedo(const Eigen::Vector2d& p) const;
+  /// Without the outline and without spread of ink.
+  [[nodiscard]] Footprint drawn_footprint(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const;
 
   float base_albedo_;
+  float darkest_;
+  double ink_spread_mm_;
   std::vector<Eigen::Vector3d> edges_;  ///< inside where a x + b y + c >= 0
   std::vector<Decal> decals_;
   Eigen::Vector2d low_{0, 0}, high_{0, 0};

@@ -106,6 +106,19 @@ void TileRenderer::tile(int x0, int y0, SensorImage& image) const {
   trace(canvas);
   shade(canvas);
   blur(canvas, image);
+  if (!image.depth_mm.empty()) measure_depth(canvas, image);
+}
+
+void TileRenderer::measure_depth(const Canvas& canvas, SensorImage& image) const {
+  for (int y = 0; y < canvas.height; ++y) {
+    float* to = image.depth_mm.ptr<float>(canvas.y0 + y) + canvas.x0;
+    const std::uint8_t* tint = image.tint.ptr<std::uint8_t>(canvas.y0 + y) + canvas.x0;
+    for (int x = 0; x < canvas.width; ++x) {
+      const Eigen::Vector2d ray = 0.5 * (canvas.corner(x + margin_px_, y + margin_px_) +
+                                         canvas.corner(x + margin_px_ + 1, y + margin_px_ + 1));
+      to[x] = static_cast<float>(surfaces_[tint[x]].hit(ray.x(), ray.y()).depth_mm);
+    }
+  }
 }
 
 void TileRenderer::trace(Canvas& canvas) const {
@@ -197,7 +210,7 @@ void TileRenderer::shade(Canvas& canvas) const {
 void TileRenderer::fill(Canvas& canvas, int x, int y, const VisibleSurface& surface, float albedo,
                         const Eigen::Vector2d& at) const {
   const auto pixel = static_cast<std::size_t>(y * canvas.columns + x);
-  canvas.light[pixel] = albedo * surface.irradiance(at) * surface.grain(at);
+  canvas.light[pixel] = albedo * surface.irradiance(at) * surface.grain(at) + surface.sheen(at);
   canvas.tint[pixel] = static_cast<std::uint8_t>(surface.index());
 }
 
@@ -224,11 +237,13 @@ void TileRenderer::sample_pixel(Canvas& canvas, int x, int y, const std::vector<
   // The light of a surface hardly changes within a pixel: once per surface, at the middle.
   const Eigen::Vector2d middle = 0.25 * (a + b + c + d);
   std::array<float, kMaxSeen> factor{};
+  std::array<float, kMaxSeen> sheen{};
   bool exact = false;
   for (std::size_t i = 0; i < seen.size(); ++i) {
     const VisibleSurface& surface = surfaces_[static_cast<std::size_t>(seen[i].surface)];
     const VisibleSurface::Hit hit = surface.hit(middle.x(), middle.y());
     factor[i] = surface.irradiance(hit.at) * surface.grain(hit.at);
+    sheen[i] = surface.sheen(hit.at);
     exact = exact || !surface.background();
   }
   const int samples = exact ? kSamples : kRoughSamples;
@@ -257,7 +272,7 @@ void TileRenderer::sample_pixel(Canvas& canvas, int x, int y, const std::vector<
       const VisibleSurface::Hit hit = surface.hit(ray.x(), ray.y());
       if (hit.depth_mm <= 0 || hit.depth_mm >= nearest || !surface.paint().inside(hit.at)) continue;
       nearest = hit.depth_mm;
-      light = surface.paint().albedo(hit.at) * factor[k];
+      light = surface.paint().albedo(hit.at) * factor[k] + sheen[k];
       front = k;
     }
     count_of[front] += 1;

@@ -22,6 +22,8 @@ class VisibleSurface {
   [[nodiscard]] bool may_meet(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const;
   [[nodiscard]] float irradiance(const Eigen::Vector2d& at) const;
   [[nodiscard]] float grain(const Eigen::Vector2d& at) const;
+  /// Light of the lamp that the surface mirrors to the camera (Blinn 1977), whatever its paint.
+  [[nodiscard]] float sheen(const Eigen::Vector2d& at) const;
   [[nodiscard]] const SurfacePaint& paint() const { return paint_; }
   [[nodiscard]] bool background() const { return background_; }
   [[nodiscard]] int index() const { return index_; }
@@ -33,8 +35,10 @@ class VisibleSurface {
   std::optional<SheetWarp> warp_;
   Eigen::Vector2d drawn_per_printed_;
   bool everywhere_ = false;               // part of the outline lies behind the camera
-  std::vector<Eigen::Vector2d> outline_;  // in normalised coordinates
+  std::vector<Eigen::Vector2d> outline_;  // in normalised coordinates; of a warped surface: points around it
   Eigen::Vector3f irradiance_;            // at the origin, and its slopes
+  float gloss_;
+  Eigen::Vector3d lamp_in_surface_;
   float grain_;
   double texels_per_mm_;
   bool background_;
@@ -64,6 +68,7 @@ class TileRenderer {
                    std::vector<Seen>& seen) const;
   void sample_pixel(Canvas& canvas, int x, int y, const std::vector<Seen>& seen) const;
   void blur(Canvas& canvas, SensorImage& image) const;
+  void measure_depth(const Canvas& canvas, SensorImage& image) const;
 
   const RayLattice& lens_;
   std::vector<VisibleSurface> surfaces_;

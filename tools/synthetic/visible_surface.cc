@@ -47,6 +47,7 @@ VisibleSurface::VisibleSurface(const Surface& surface, const Lamp& lamp, const R
     : paint_(surface),
       warp_(surface.warp),
       drawn_per_printed_(surface.print_scale.cwiseInverse()),
+      gloss_(surface.gloss * static_cast<float>(lamp.strength)),
       grain_(surface.grain),
       texels_per_mm_(1 / surface.grain_mm),
       background_(surface.background),
@@ -55,16 +56,28 @@ VisibleSurface::VisibleSurface(const Surface& surface, const Lamp& lamp, const R
   const Rigid3 surface_from_camera = inverse(camera_from_surface);
   surface_from_camera_ = surface_from_camera.rotation_matrix();
   camera_in_surface_ = surface_from_camera.translation;
-  for (const Eigen::Vector2d& corner : surface.outline_mm) {
-    const Eigen::Vector3d p = camera_from_surface * surface.printed_point(corner);
-    if (p.z() < 1.0) {
-      everywhere_ = true;
-    } else {
-      outline_.emplace_back(p.head<2>() / p.z());
+  // A warped surface lies within the block of its outline and its heights.
+  std::vector<double> heights{0};
+  if (warp_) {
+    heights = {warp_->height_mm.cwiseMin(0).sum(), warp_->height_mm.cwiseMax(0).sum()};
+    for (const Eigen::Vector2d& corner : surface.outline_mm) {
+      const double z = surface.printed_point(corner).z();
+      heights = {std::min(heights[0], z), std::max(heights[1], z)};
     }
   }
-  // A warped sheet's outline is not straight in the image.
-  everywhere_ = everywhere_ || warp_.has_value();
+  for (const Eigen::Vector2d& corner : surface.outline_mm) {
+    for (const double height : heights) {
+      Eigen::Vector3d in_surface = surface.printed_point(corner);
+      in_surface.z() = height;
+      const Eigen::Vector3d p = camera_from_surface * in_surface;
+      if (p.z() < 1.0) {
+        everywhere_ = true;
+      } else {
+        outline_.emplace_back(p.head<2>() / p.z());
+      }
+    }
+  }
+  lamp_in_surface_ = surface.world_from_surface.rotation.conjugate() * lamp.towards.normalized();
   const Eigen::Vector3d normal = surface.world_from_surface.rotation * Eigen::Vector3d::UnitZ();
   const double base = lamp.ambient + lamp.strength * std::max(0.0, normal.dot(lamp.towards.normalized()));
   const auto slope = [&](const Eigen::Vector3d& axis) {
@@ -103,6 +116,7 @@ bool VisibleSurface::may_meet(const Eigen::Vector2d& low, const Eigen::Vector2d&
     outline_high = outline_high.cwiseMax(p);
   }
   if ((outline_low.array() > high.array()).any() || (outline_high.array() < low.array()).any()) return false;
+  if (warp_) return true;
   for (std::size_t i = 0; i < outline_.size(); ++i) {
     const Eigen::Vector2d& a = outline_[i];
     const Eigen::Vector2d way = outline_[(i + 1) % outline_.size()] - a;
@@ -117,6 +131,14 @@ bool VisibleSurface::may_meet(const Eigen::Vector2d& low, const Eigen::Vector2d&
 float VisibleSurface::irradiance(const Eigen::Vector2d& at) const {
   return std::max(0.05F, irradiance_.x() + irradiance_.y() * static_cast<float>(at.x()) +
                              irradiance_.z() * static_cast<float>(at.y()));
+}
+
+float VisibleSurface::sheen(const Eigen::Vector2d& at) const {
+  if (gloss_ <= 0) return 0;
+  constexpr double kExponent = 60;  // semi-gloss: the highlight is about 15 deg wide
+  const Eigen::Vector3d sight = (camera_in_surface_ - Eigen::Vector3d(at.x(), at.y(), 0)).normalized();
+  const double cosine = (sight + lamp_in_surface_).normalized().z();
+  return cosine > 0 ? gloss_ * static_cast<float>(std::pow(cosine, kExponent)) : 0.0F;
 }
 
 float VisibleSurface::grain(const Eigen::Vector2d& at) const {
