@@ -282,4 +282,26 @@ ImageListing list_images(const fs::path& folder, const ListingOptions& options) 
   return Lister(root, options).list();
 }
 
+std::vector<ImagePlace> places_of_names(const std::vector<std::string>& names,
+                                        const std::vector<std::string>& camera_folders) {
+  std::vector<ImagePlace> places(names.size());
+  std::vector<fs::path> keys(names.size());
+  std::map<std::string, std::set<fs::path>> keys_with_name;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    for (const fs::path& part : fs::path(names[i]).parent_path()) {
+      if (std::find(camera_folders.begin(), camera_folders.end(), part.string()) != camera_folders.end()) {
+        places[i].camera_folder = part.string();
+      } else if (!is_format_folder(part)) {
+        keys[i] /= part;
+      }
+    }
+    keys_with_name[keys[i].filename().string()].insert(keys[i]);
+  }
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string last = keys[i].filename().string();
+    places[i].pose = keys_with_name[last].size() == 1 ? last : keys[i].generic_string();
+  }
+  return places;
+}
+
 }  // namespace hexcal

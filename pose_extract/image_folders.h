@@ -47,6 +47,18 @@ struct ListingOptions {
 /// Throws InputError if the folder does not exist.
 [[nodiscard]] ImageListing list_images(const std::filesystem::path& folder, const ListingOptions& options);
 
+/// What a name relative to the image folder says: the pose, and the folder that tells its camera (empty:
+/// none).
+struct ImagePlace {
+  std::string pose;
+  std::string camera_folder;
+};
+
+/// The places of names by the rule of list_images, for observations whose photographs are not at hand. A name
+/// without a folder has an empty pose.
+[[nodiscard]] std::vector<ImagePlace> places_of_names(const std::vector<std::string>& names,
+                                                      const std::vector<std::string>& camera_folders);
+
 /// Natural order: runs of digits compare as numbers.
 [[nodiscard]] bool natural_less(const std::string& a, const std::string& b);
 

@@ -4,6 +4,7 @@
 
 #include "photogrammetry/photograph/decoders.h"
 #include "photogrammetry/photograph/file_signature.h"
+#include "photogrammetry/photograph/photograph_file.h"
 #include "photogrammetry/photograph/photograph_format.h"
 #include "photogrammetry/photograph/sha256.h"
 
@@ -11,30 +12,6 @@ namespace hexcal {
 namespace {
 
 constexpr std::uintmax_t kMaxFileBytes = 1U << 29;
-
-struct FileBytes {
-  PhotographStatus status = PhotographStatus::unreadable;
-  std::string reason;
-  std::string bytes;
-};
-
-FileBytes read_bytes(const std::filesystem::path& path) {
-  FileBytes file;
-  std::error_code error;
-  if (!std::filesystem::exists(path, error)) return {PhotographStatus::missing, "no such file", {}};
-  if (!std::filesystem::is_regular_file(path, error)) return {PhotographStatus::unreadable, "not a file", {}};
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (error) return {PhotographStatus::unreadable, error.message(), {}};
-  if (size == 0) return {PhotographStatus::empty, "the file has no content", {}};
-  if (size > kMaxFileBytes) return {PhotographStatus::too_large, std::to_string(size) + " bytes", {}};
-  std::ifstream in(path, std::ios::binary);
-  file.bytes.resize(size);
-  if (!in || !in.read(file.bytes.data(), static_cast<std::streamsize>(size))) {
-    return {PhotographStatus::unreadable, "cannot be read", {}};
-  }
-  file.status = PhotographStatus::ok;
-  return file;
-}
 
 DecodedImage decode(const std::filesystem::path& path, std::string_view bytes) {
   if (file_signature(bytes) == FileSignature::jpeg) return decode_jpeg_luma(bytes);
@@ -44,16 +21,42 @@ DecodedImage decode(const std::filesystem::path& path, std::string_view bytes) {
 
 }  // namespace
 
-Photograph read_photograph(const std::filesystem::path& path) {
+PhotographFile read_photograph_file(const std::filesystem::path& path) {
+  PhotographFile file;
+  file.path = path;
+  const auto failed = [&file](PhotographStatus status, const std::string& reason) {
+    file.status = status;
+    file.reason = reason;
+    file.bytes.clear();
+    return file;
+  };
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) return failed(PhotographStatus::missing, "no such file");
+  if (!std::filesystem::is_regular_file(path, error))
+    return failed(PhotographStatus::unreadable, "not a file");
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error) return failed(PhotographStatus::unreadable, error.message());
+  if (size == 0) return failed(PhotographStatus::empty, "the file has no content");
+  if (size > kMaxFileBytes) return failed(PhotographStatus::too_large, std::to_string(size) + " bytes");
+  std::ifstream in(path, std::ios::binary);
+  file.bytes.resize(size);
+  if (!in || !in.read(file.bytes.data(), static_cast<std::streamsize>(size))) {
+    return failed(PhotographStatus::unreadable, "cannot be read");
+  }
+  file.status = PhotographStatus::ok;
+  file.sha256 = sha256_hex(file.bytes);
+  return file;
+}
+
+Photograph decode_photograph(const PhotographFile& file) {
   Photograph photograph;
-  photograph.path = path;
-  const FileBytes file = read_bytes(path);
+  photograph.path = file.path;
   photograph.status = file.status;
   photograph.reason = file.reason;
   if (file.status != PhotographStatus::ok) return photograph;
-  photograph.sha256 = sha256_hex(file.bytes);
+  photograph.sha256 = file.sha256;
   photograph.info = read_exif(file.bytes);
-  DecodedImage image = decode(path, file.bytes);
+  DecodedImage image = decode(file.path, file.bytes);
   photograph.status = image.status;
   photograph.reason = image.reason;
   photograph.tone = image.tone;
@@ -65,9 +68,16 @@ Photograph read_photograph(const std::filesystem::path& path) {
   return photograph;
 }
 
-PhotographInfo read_photograph_info(const std::filesystem::path& path) {
-  const FileBytes file = read_bytes(path);
+Photograph read_photograph(const std::filesystem::path& path) {
+  return decode_photograph(read_photograph_file(path));
+}
+
+PhotographInfo photograph_info(const PhotographFile& file) {
   return file.status == PhotographStatus::ok ? read_exif(file.bytes) : PhotographInfo{};
+}
+
+PhotographInfo read_photograph_info(const std::filesystem::path& path) {
+  return photograph_info(read_photograph_file(path));
 }
 
 const char* photograph_status_name(PhotographStatus status) {

@@ -4,6 +4,7 @@ Usage: hexcal_test.py SOURCE PROGRAM, with PYTHONPATH set to the build's module.
 """
 import ast
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -158,6 +159,39 @@ class Measuring(unittest.TestCase):
         moved = np.array(measured.ids) != "home"
         whitened = (measured.poses - wanted)[moved] / measured.sigmas[moved]
         self.assertLess(np.sqrt((whitened**2).mean()), 2)
+
+
+    def test_cameras_told_apart_by_folder_and_cameras_that_suit_nothing(self):
+        with tempfile.TemporaryDirectory() as folder:
+            lab = pathlib.Path(folder) / "lab"
+            shutil.copytree(SAMPLE, lab, ignore=shutil.ignore_patterns("p00[2-9]", "results"))
+            camera = (lab / "camera.yaml").read_text()
+            # Not the truth of these photographs, but another camera: where it is not chosen the poses are others.
+            (lab / "right.yaml").write_text(camera.replace("cx_px: 751.5", "cx_px: 756.5"))
+            text = (lab / "campaign.yaml").read_text()
+            (lab / "campaign.yaml").write_text(text.replace(
+                "camera: camera.yaml",
+                "camera:\n  - {file: camera.yaml, folder: left}\n  - {file: right.yaml, folder: right}"))
+            for pose in (lab / "poses").iterdir():
+                photographs = sorted(pose.iterdir())
+                for camera_folder, files in (("left", photographs[:-1]), ("right", photographs[-1:])):
+                    (pose / camera_folder).mkdir()
+                    for file in files:
+                        file.rename(pose / camera_folder / file.name)
+            subprocess.run([PROGRAM, "measure", lab], stdout=subprocess.DEVNULL)
+            written = hexcal.read_poses(lab / "results" / "poses.csv")
+            shutil.move(lab / "results" / "observations.txt", lab)
+            shutil.rmtree(lab / "results")
+            for observations in (None, lab / "observations.txt"):
+                measured = hexcal.measure(lab, observations, cache=False)
+                self.assertEqual(measured.ids, written.ids)
+                np.testing.assert_allclose(measured.poses, written.poses, atol=1e-6)
+            for file in ("camera.yaml", "right.yaml"):
+                (lab / file).write_text(camera.replace("[1504, 1000]", "[1500, 1000]"))
+            for observations in (None, lab / "observations.txt"):
+                with self.assertRaisesRegex(hexcal.InputError, "suits a camera file"):
+                    hexcal.measure(lab, observations)
+            self.assertFalse(list((lab / "results").glob("*.csv")))
 
 
 class Stubs(unittest.TestCase):

@@ -19,9 +19,11 @@ ARROWS = {
     "tools/io": ["pose_extract", "calibration"],
     "tools/synthetic": ["pose_extract", "calibration", "tools/io"],
     "tools/report": ["pose_extract", "calibration", "tools/io"],
-    "tools/hexcal": ["tools/io", "tools/synthetic", "tools/report"],
-    "tools/bench": ["tools/io", "tools/synthetic", "tools/report"],
-    "tools/python": ["tools/hexcal"],
+    "tools/campaign": ["pose_extract", "calibration", "tools/io"],
+    "tools/page": ["tools/campaign", "tools/report"],
+    "tools/hexcal": ["tools/campaign", "tools/synthetic", "tools/report", "tools/page"],
+    "tools/bench": ["tools/campaign", "tools/synthetic", "tools/report"],
+    "tools/python": ["tools/campaign", "tools/synthetic", "tools/report"],
 }
 BANNED_NAMES = re.compile(r"(^|[_.-])(utils?|misc|common|helpers?)([_.-]|$)")
 PRIVATE_HEADERS = re.compile(r"<(ceres|pcl|apriltag|exiv2|libraw)/")

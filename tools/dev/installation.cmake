@@ -3,7 +3,7 @@
 # python3-hexcal.
 
 # Headers and documents keep the folders of the source, so that includes and links hold.
-foreach(folder kinematics photogrammetry camera_calib pose_extract calibration tools/io)
+foreach(folder kinematics photogrammetry camera_calib pose_extract calibration tools/io tools/campaign)
   install(DIRECTORY ${folder}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/hexcal/${folder} COMPONENT development
           FILES_MATCHING PATTERN "*.h")
 endforeach()

@@ -15,13 +15,13 @@
 #include "tools/hexcal/camera_tables.h"
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/terminal.h"
-#include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/calibration_tables.h"
 #include "tools/io/camera_file.h"
 #include "tools/io/json_text.h"
 #include "tools/io/sheet_file.h"
 #include "tools/io/template_pdf.h"
+#include "tools/io/version.h"
 #include "tools/report/camera_page.h"
 
 namespace hexcal {

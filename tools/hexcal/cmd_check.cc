@@ -7,9 +7,8 @@
 #include <set>
 
 #include "kinematics/geometry/input_error.h"
-#include "tools/hexcal/campaign_measurement.h"
+#include "tools/campaign/photograph_heads.h"
 #include "tools/hexcal/commands.h"
-#include "tools/hexcal/photograph_heads.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/io/hexapod_file.h"
 #include "tools/io/json_text.h"
@@ -54,8 +53,8 @@ class Findings {
   int bad_ = 0;
 };
 
-void check_photographs(const OpenCampaign& open, Findings& findings) {
-  for (const HeadFinding& finding : inspect_heads(open)) {
+void check_photographs(const OpenCampaign& open, const HeadInspection& heads, Findings& findings) {
+  for (const HeadFinding& finding : heads.findings) {
     const std::string line = fmt::format("{}: {}", open.listing.images[finding.image].name, finding.words);
     finding.bad ? findings.bad(line) : findings.warn(line);
   }
@@ -121,7 +120,8 @@ int check(const MeasureRequest& request, bool as_json) {
                     [&] { return fmt::format("{} rows", read_leg_table(*campaign.legs).size()); });
   }
   check_poses(open, findings);
-  check_photographs(open, findings);
+  const HeadInspection heads = inspect_heads(open);
+  check_photographs(open, heads, findings);
   if (as_json) {
     const nlohmann::ordered_json json{{"poses", open.listing.poses.size()},
                                       {"photographs", open.listing.images.size()},
@@ -133,6 +133,7 @@ int check(const MeasureRequest& request, bool as_json) {
                findings.count() == 0 ? "nothing wrong found" : fmt::format("{} problems", findings.count()));
     if (findings.count() == 0) suggest_next("hexcal run " + shell_word(request.campaign.string()));
   }
+  refuse_foreign_camera(open, heads);
   return findings.count() == 0 ? kDone : kSomeFailed;
 }
 

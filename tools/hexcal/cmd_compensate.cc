@@ -8,10 +8,10 @@
 
 #include "calibration/calibrate.h"
 #include "kinematics/geometry/input_error.h"
+#include "tools/hexcal/campaign_commands.h"
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/compensate_report.h"
 #include "tools/hexcal/terminal.h"
-#include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/calibration_record.h"
 #include "tools/io/campaign_file.h"
@@ -19,25 +19,12 @@
 #include "tools/io/model_file.h"
 #include "tools/io/observation_table.h"
 #include "tools/io/pose_table.h"
+#include "tools/io/version.h"
 
 namespace hexcal {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct CompensateFlags {
-  fs::path campaign;
-  fs::path hexapod, targets, poses, legs, covariance, apply, out;
-  std::string method = "auto";
-  std::string frames = "known";
-  int round = 1;
-  double position_sigma_mm = 0;
-  double orientation_sigma_deg = 0;
-  double tolerance_mm = 0;
-  std::vector<std::string> fixed;
-  bool with_suspect = false;
-  bool json = false;
-};
 
 std::optional<fs::path> optional_path(const fs::path& path) {
   return path.empty() ? std::nullopt : std::optional(path);
@@ -130,6 +117,8 @@ std::vector<fs::path> write_results(const fs::path& folder, const std::string& h
   return written;
 }
 
+}  // namespace
+
 int run_compensate(CompensateFlags flags) {
   resolve(flags);
   const PlatformGeometry nominal = read_hexapod_file(flags.hexapod);
@@ -185,8 +174,6 @@ int run_compensate(CompensateFlags flags) {
                                             [](const auto& c) { return c.status == CommandStatus::ok; });
   return all_ok ? kDone : kSomeFailed;
 }
-
-}  // namespace
 
 void add_compensate_command(CLI::App& app, Action& action) {
   const auto flags = std::make_shared<CompensateFlags>();

@@ -4,7 +4,7 @@
 
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/command_line.h"
-#include "tools/hexcal/version.h"
+#include "tools/io/version.h"
 
 namespace hexcal {
 namespace {

@@ -13,11 +13,11 @@
 #include "photogrammetry/photograph/sha256.h"
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/terminal.h"
-#include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/camera_file.h"
 #include "tools/io/json_text.h"
 #include "tools/io/observations_file.h"
+#include "tools/io/version.h"
 
 namespace hexcal {
 namespace {

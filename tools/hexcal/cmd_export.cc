@@ -9,7 +9,6 @@
 #include "kinematics/geometry/input_error.h"
 #include "kinematics/inverse.h"
 #include "tools/hexcal/command.h"
-#include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/camera_export.h"
 #include "tools/io/camera_file.h"
@@ -17,6 +16,7 @@
 #include "tools/io/csv_table.h"
 #include "tools/io/model_file.h"
 #include "tools/io/pose_table.h"
+#include "tools/io/version.h"
 #include "tools/io/yaml_map.h"
 
 namespace hexcal {

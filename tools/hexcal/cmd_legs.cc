@@ -7,11 +7,11 @@
 #include "kinematics/inverse.h"
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/machine_flags.h"
-#include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/csv_table.h"
 #include "tools/io/pose_table.h"
 #include "tools/io/row_stream.h"
+#include "tools/io/version.h"
 
 namespace hexcal {
 namespace {

@@ -4,12 +4,15 @@
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
-#include "kinematics/geometry/input_error.h"
-#include "tools/hexcal/campaign_measurement.h"
+#include "tools/campaign/campaign_lock.h"
+#include "tools/campaign/measure_campaign.h"
+#include "tools/campaign/measurement_record.h"
+#include "tools/campaign/photograph_heads.h"
+#include "tools/hexcal/campaign_commands.h"
 #include "tools/hexcal/commands.h"
-#include "tools/hexcal/measurement_record.h"
-#include "tools/hexcal/photograph_heads.h"
+#include "tools/hexcal/measurement_text.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/json_text.h"
@@ -17,16 +20,21 @@
 namespace hexcal {
 namespace {
 
-struct MeasureFlags {
-  MeasureRequest request;
-  std::string interior = "refine";
-  bool json = false;
-  bool dry_run = false;
-  bool no_cache = false;
+// Photographs counted on the terminal as they are measured.
+class PhotographBar : public MeasurementObserver {
+ public:
+  void begin(std::size_t photographs) override { bar_.emplace("photographs", photographs); }
+  void observed(const CampaignPhotograph& photograph) override {
+    (void)photograph;
+    bar_->advance();
+  }
+
+ private:
+  std::optional<ProgressBar> bar_;
 };
 
 // What would be measured and what is wrong with the folder, as lines for people.
-int list_only(const OpenCampaign& open, const std::vector<HeadFinding>& findings) {
+int list_only(const OpenCampaign& open, const HeadInspection& heads) {
   const ImageListing& listing = open.listing;
   int bad = 0;
   for (const std::string& pose : listing.poses) {
@@ -37,7 +45,7 @@ int list_only(const OpenCampaign& open, const std::vector<HeadFinding>& findings
       if (listing.images[i].pose != pose) continue;
       names += ' ' + listing.images[i].path.filename().string();
       bool image_bad = false;
-      for (const HeadFinding& finding : findings) {
+      for (const HeadFinding& finding : heads.findings) {
         if (finding.image != i) continue;
         image_bad = image_bad || finding.bad;
         remarks.push_back(fmt::format("{}: {}", listing.images[i].name, finding.words));
@@ -55,17 +63,17 @@ int list_only(const OpenCampaign& open, const std::vector<HeadFinding>& findings
   return bad == 0 ? kDone : kSomeFailed;
 }
 
-int list_as_json(const OpenCampaign& open, const std::vector<HeadFinding>& findings) {
+int list_as_json(const OpenCampaign& open, const HeadInspection& heads) {
   nlohmann::ordered_json json{{"poses", open.listing.poses},
                               {"photographs", nlohmann::ordered_json::array()},
                               {"skipped", nlohmann::ordered_json::array()}};
   for (std::size_t i = 0; i < open.listing.images.size(); ++i) {
     const CampaignImage& image = open.listing.images[i];
     nlohmann::ordered_json row{
-        {"photo", image.name}, {"pose", image.pose}, {"camera", open.camera_of_image[i]}};
+        {"photo", image.name}, {"pose", image.pose}, {"camera", heads.camera_of_image[i]}};
     row["problems"] = nlohmann::ordered_json::array();
     row["remarks"] = nlohmann::ordered_json::array();
-    for (const HeadFinding& finding : findings) {
+    for (const HeadFinding& finding : heads.findings) {
       if (finding.image == i) row[finding.bad ? "problems" : "remarks"].push_back(finding.words);
     }
     json["photographs"].push_back(row);
@@ -73,23 +81,9 @@ int list_as_json(const OpenCampaign& open, const std::vector<HeadFinding>& findi
   for (const SkippedFile& file : open.listing.skipped)
     json["skipped"].push_back({{"file", file.name}, {"reason", file.reason}});
   fmt::print("{}\n", json_text(json, 1));
-  const bool any_bad = std::ranges::any_of(findings, [](const HeadFinding& finding) { return finding.bad; });
+  const bool any_bad =
+      std::ranges::any_of(heads.findings, [](const HeadFinding& finding) { return finding.bad; });
   return any_bad ? kSomeFailed : kDone;
-}
-
-// A camera file that suits no photograph at all is a mistake in the files, not a bad pose: nothing is written
-// then.
-void refuse_foreign_camera(const std::filesystem::path& campaign, const CampaignObservations& observations,
-                           const CampaignResult& result) {
-  const std::vector<MeasuredPhotograph>& photographs = result.photographs;
-  if (photographs.empty() || !std::ranges::all_of(photographs, [](const MeasuredPhotograph& photograph) {
-        return photograph.status == PhotoStatus::wrong_camera;
-      })) {
-    return;
-  }
-  throw InputError(fmt::format("{}: none of the {} photographs suits a camera file; {}: {}",
-                               campaign.string(), photographs.size(),
-                               observations.photographs.front().seen.name, photographs.front().words));
 }
 
 std::string next_command(const std::filesystem::path& path, const Campaign& campaign) {
@@ -97,48 +91,44 @@ std::string next_command(const std::filesystem::path& path, const Campaign& camp
   return fmt::format("hexcal {} {}", machine_known ? "compensate" : "report", shell_word(path.string()));
 }
 
-MeasurementAnswer measure_anew(const MeasureRequest& request, OpenCampaign& open) {
-  CampaignObservations observations;
-  if (request.observations) {
-    observations = campaign_observations(*request.observations, open);
-  } else {
-    ProgressBar progress("photographs", open.listing.images.size());
-    observations = observe_campaign(request, open, [&progress] { progress.advance(); });
-  }
-  CampaignResult result = extract_poses(open.campaign, observations, extract_options(request));
-  refuse_foreign_camera(request.campaign, observations, result);
-  judge_against_files(open, result);
+MeasurementAnswer measure_anew(const MeasureRequest& request, OpenCampaign open) {
+  PhotographBar bar;
+  const CampaignMeasurement measurement = measure_campaign(request, std::move(open), bar);
   MeasurementAnswer answer;
-  answer.written = write_results(request, open, observations, result);
-  answer.text = measurement_text(observations, result, open.listing);
-  answer.exit_code = measurement_exit_code(result);
-  keep_measurement(request, open, observations, answer);
+  answer.written = write_results(request, measurement);
+  answer.text = measurement_text(measurement);
+  answer.exit_code = measurement_exit_code(measurement.result);
+  keep_measurement(request, measurement.open, measurement.observations, answer);
   return answer;
 }
 
-int measure(MeasureFlags flags) {
-  MeasureRequest& request = flags.request;
+}  // namespace
+
+int run_measure(const MeasureFlags& flags) {
+  MeasureRequest request = flags.request;
   request.interior_fixed = flags.interior == "fixed";
   request.cache = !flags.no_cache;
   OpenCampaign open = open_campaign(request);
   if (flags.dry_run) {
-    const std::vector<HeadFinding> findings = inspect_heads(open);
-    return flags.json ? list_as_json(open, findings) : list_only(open, findings);
+    const HeadInspection heads = inspect_heads(open);
+    const int code = flags.json ? list_as_json(open, heads) : list_only(open, heads);
+    refuse_foreign_camera(open, heads);
+    return code;
   }
+  const std::filesystem::path quality = open.results / "quality.json";
+  const std::string next = next_command(request.campaign, open.campaign);
   const CampaignLock lock(open.results);
   std::optional<MeasurementAnswer> answer = unchanged_measurement(request, open);
-  if (!answer) answer = measure_anew(request, open);
+  if (!answer) answer = measure_anew(request, std::move(open));
   if (flags.json) {
-    fmt::print("{}", read_file(open.results / "quality.json"));
+    fmt::print("{}", read_file(quality));
   } else {
     fmt::print("{}", answer->text);
     fmt::print("{}", written_line(answer->written));
-    suggest_next(next_command(request.campaign, open.campaign));
+    suggest_next(next);
   }
   return answer->exit_code;
 }
-
-}  // namespace
 
 void add_measure_command(CLI::App& app, Action& action) {
   CLI::App* command =
@@ -183,7 +173,7 @@ void add_measure_command(CLI::App& app, Action& action) {
   command->add_flag("--dry-run", flags->dry_run,
                     "List what would be measured and what is wrong with the folder");
   command->add_flag("--json", flags->json, "Print the result as JSON");
-  command->callback([flags, &action] { action = [flags] { return measure(*flags); }; });
+  command->callback([flags, &action] { action = [flags] { return run_measure(*flags); }; });
 }
 
 }  // namespace hexcal

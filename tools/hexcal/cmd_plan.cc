@@ -11,13 +11,13 @@
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/marker_visibility.h"
 #include "tools/hexcal/terminal.h"
-#include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/camera_file.h"
 #include "tools/io/campaign_file.h"
 #include "tools/io/hexapod_file.h"
 #include "tools/io/json_text.h"
 #include "tools/io/pose_table.h"
+#include "tools/io/version.h"
 
 namespace hexcal {
 namespace {

@@ -4,6 +4,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "tools/hexcal/campaign_commands.h"
 #include "tools/hexcal/commands.h"
 #include "tools/hexcal/report_input.h"
 #include "tools/hexcal/terminal.h"
@@ -15,12 +16,6 @@ namespace hexcal {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct ReportFlags {
-  fs::path campaign, out, figures, before;
-  std::string method = "auto";
-  bool json = false;
-};
 
 // A page ready to be written, of one campaign or of two.
 struct PreparedPage {
@@ -71,7 +66,9 @@ Colour colour_of(Light light) {
   return Colour::plain;
 }
 
-int write_report(const ReportFlags& flags) {
+}  // namespace
+
+int run_report(const ReportFlags& flags) {
   refuse_linked_folders(campaign_folder(flags.campaign) / "results");
   const PreparedPage page = prepare_page(flags);
   const char* name = flags.before.empty() ? "report.html" : "comparison.html";
@@ -99,8 +96,6 @@ int write_report(const ReportFlags& flags) {
   return kDone;
 }
 
-}  // namespace
-
 void add_report_command(CLI::App& app, Action& action) {
   const auto flags = std::make_shared<ReportFlags>();
   CLI::App* command =
@@ -123,7 +118,7 @@ void add_report_command(CLI::App& app, Action& action) {
       "  wrote tiger/results/report.html\n"
       "After the corrected commands were sent and photographed as a campaign of its own:\n"
       "  hexcal report tiger-again --before tiger");
-  command->callback([flags, &action] { action = [flags] { return write_report(*flags); }; });
+  command->callback([flags, &action] { action = [flags] { return run_report(*flags); }; });
 }
 
 }  // namespace hexcal

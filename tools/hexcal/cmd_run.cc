@@ -1,13 +1,13 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <string>
-#include <vector>
+#include <string_view>
 
-#include "tools/hexcal/campaign_measurement.h"
+#include "tools/campaign/campaign_lock.h"
+#include "tools/hexcal/campaign_commands.h"
 #include "tools/hexcal/commands.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/io/campaign_file.h"
@@ -16,26 +16,21 @@ namespace hexcal {
 namespace {
 
 struct RunFlags {
-  std::string campaign;
-  std::string method;
+  std::filesystem::path campaign;
+  std::string method = "auto";
   bool json = false;
 };
 
-// One of the other commands with its own flags, as if typed. Its JSON becomes one member of the whole.
-int run_stage(void (*add)(CLI::App&, Action&), std::vector<std::string> arguments, bool json) {
+// One stage under its heading; its JSON becomes one member of the whole.
+template <typename Stage>
+int run_stage(const char* name, const std::string& heading, bool json, const Stage& stage) {
   if (json) {
-    fmt::print("{}\"{}\": ", arguments[0] == "measure" ? "{" : ", ", arguments[0]);
-    arguments.insert(arguments.begin() + 1, "--json");
+    fmt::print("{}\"{}\": ", std::string_view(name) == "measure" ? "{" : ", ", name);
   } else {
-    fmt::print("{}\n", coloured("== hexcal " + fmt::format("{}", fmt::join(arguments, " ")), Colour::bold));
+    fmt::print("{}\n", coloured("== hexcal " + heading, Colour::bold));
   }
   std::fflush(stdout);
-  CLI::App app;
-  Action action;
-  add(app, action);
-  std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
-  app.parse(arguments);
-  const int code = action();
+  const int code = stage();
   if (!json) fmt::print("\n");
   std::fflush(stdout);
   return code;
@@ -45,17 +40,28 @@ int run_run(const RunFlags& flags) {
   const Campaign campaign = read_campaign(flags.campaign);
   const CampaignLock lock(campaign.folder / "results");
   auto held = std::make_unique<SuggestionsHeld>();
-  // As an argument of the stages; a name that begins with a dash is no flag.
-  const std::string folder = flags.campaign.starts_with('-') ? "./" + flags.campaign : flags.campaign;
-  int worst = run_stage(add_measure_command, {"measure", folder}, flags.json);
+  const std::string folder = flags.campaign.string();
+  MeasureFlags measure;
+  measure.request.campaign = flags.campaign;
+  measure.json = flags.json;
+  int worst = run_stage("measure", "measure " + folder, flags.json, [&] { return run_measure(measure); });
   if (campaign.hexapod && campaign.targets) {
-    std::vector<std::string> arguments{"compensate", folder};
-    if (!flags.method.empty()) arguments.insert(arguments.end(), {"--method", flags.method});
-    worst = std::max(worst, run_stage(add_compensate_command, arguments, flags.json));
+    CompensateFlags compensate;
+    compensate.campaign = flags.campaign;
+    compensate.method = flags.method;
+    compensate.json = flags.json;
+    const std::string heading =
+        "compensate " + folder + (flags.method == "auto" ? "" : " --method " + flags.method);
+    worst = std::max(
+        worst, run_stage("compensate", heading, flags.json, [&] { return run_compensate(compensate); }));
   } else if (!flags.json) {
     fmt::print("not compensated: campaign.yaml names no {}\n\n", campaign.hexapod ? "targets" : "hexapod");
   }
-  worst = std::max(worst, run_stage(add_report_command, {"report", folder}, flags.json));
+  ReportFlags report;
+  report.campaign = flags.campaign;
+  report.json = flags.json;
+  worst = std::max(worst,
+                   run_stage("report", "report " + folder, flags.json, [&] { return run_report(report); }));
   held.reset();
   if (flags.json) {
     fmt::print("}}\n");

@@ -9,11 +9,11 @@
 #include "photogrammetry/markers/marker.h"
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/terminal.h"
-#include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/scalar_text.h"
 #include "tools/io/sheet_file.h"
 #include "tools/io/template_pdf.h"
+#include "tools/io/version.h"
 
 namespace hexcal {
 namespace {

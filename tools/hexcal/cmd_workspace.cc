@@ -10,11 +10,11 @@
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/machine_flags.h"
 #include "tools/hexcal/slice_picture.h"
-#include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/csv_table.h"
 #include "tools/io/pose_table.h"
 #include "tools/io/row_stream.h"
+#include "tools/io/version.h"
 
 namespace hexcal {
 namespace {

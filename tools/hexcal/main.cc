@@ -11,8 +11,8 @@
 #include "kinematics/geometry/input_error.h"
 #include "tools/hexcal/commands.h"
 #include "tools/hexcal/terminal.h"
-#include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/version.h"
 
 namespace {
 

@@ -5,13 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "kinematics/geometry/covariance.h"
 #include "kinematics/geometry/input_error.h"
 #include "kinematics/geometry/median.h"
-#include "tools/io/atomic_file.h"
-#include "tools/io/csv_table.h"
+#include "tools/io/marker_table.h"
+#include "tools/io/photo_table.h"
+#include "tools/io/quality_file.h"
 #include "tools/io/residual_file.h"
 #include "tools/report/axis_ticks.h"
 #include "tools/report/markup.h"
@@ -20,49 +20,39 @@ namespace hexcal {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
 // Ellipsoids are enlarged until a typical one is this share of the scene.
 constexpr double kTypicalEllipsoidShare = 0.08;
 
-Json read_quality(const fs::path& path) {
-  try {
-    return Json::parse(read_file(path));
-  } catch (const Json::exception& error) {
-    throw InputError(fmt::format("{}: {}", path.string(), error.what()));
-  }
+std::string point_name(const MarkerPoint& point) {
+  return point.corner < 0 ? fmt::format("{}", point.id) : fmt::format("{}.{}", point.id, point.corner);
 }
 
-std::string point_name(const Json& point) {
-  const std::string name = point.get<std::string>();
-  return name.ends_with(".-1") ? name.substr(0, name.size() - 3) : name;
-}
-
-void add_lengths(const Json& rows, const char* kind, NetworkPart& network) {
-  for (const Json& row : rows) {
-    LengthPart length;
-    length.name = fmt::format("{} {} to {}", kind, point_name(row.at("a")), point_name(row.at("b")));
-    if (row.at("measured").get<bool>()) {
-      length.measured_mm = row.at("length_mm").get<double>();
-      length.sigma_mm = row.at("sigma_mm").get<double>();
+void add_lengths(const std::vector<MeasuredLength>& lengths, const char* kind, NetworkPart& network) {
+  for (const MeasuredLength& length : lengths) {
+    LengthPart part;
+    part.name = fmt::format("{} {} to {}", kind, point_name(length.known.a), point_name(length.known.b));
+    if (length.measured) {
+      part.measured_mm = length.length_mm;
+      part.sigma_mm = length.sigma_mm;
     }
-    length.stated_mm = row.at("stated_mm").get<double>();
-    network.lengths.push_back(std::move(length));
+    part.stated_mm = length.known.length_mm;
+    network.lengths.push_back(std::move(part));
   }
 }
 
 // How a body's frame was found, in words.
-std::string datum_words(const Json& datum) {
-  if (!datum.at("ok").get<bool>()) return datum.at("reason").get<std::string>();
+std::string datum_words(const DatumFrame& datum) {
+  if (!datum.ok) return datum.reason;
   double squares = 0;
   int used = 0;
   int left_out = 0;
-  for (const Json& residual : datum.at("residuals")) {
-    if (!residual.at("used").get<bool>()) {
+  for (const DatumResidual& residual : datum.residuals) {
+    if (!residual.used) {
       ++left_out;
       continue;
     }
-    for (const Json& value : residual.at("residual_mm")) squares += std::pow(value.get<double>(), 2);
+    squares += residual.residual_mm.squaredNorm();
     ++used;
   }
   std::vector<std::string> words;
@@ -71,57 +61,22 @@ std::string datum_words(const Json& datum) {
                                 significant_text(std::sqrt(squares / (3.0 * used)), 2)));
   }
   if (left_out > 0) words.push_back(fmt::format("{} left out", left_out));
-  for (const Json& note : datum.at("notes")) words.push_back(note.get<std::string>());
+  words.insert(words.end(), datum.notes.begin(), datum.notes.end());
   return words.empty() ? "defined by the home pose" : fmt::format("{}", fmt::join(words, "; "));
 }
 
 void add_quality(const fs::path& path, NetworkPart& network) {
-  const Json quality = read_quality(path);
-  try {
-    network.sigma0 = quality.at("sigma0").get<double>();
-    network.rms_px = quality.at("rms_px").get<double>();
-    network.redundancy = quality.at("redundancy").get<double>();
-    network.warnings = quality.at("warnings").get<std::vector<std::string>>();
-    add_lengths(quality.at("bars"), "bar", network);
-    add_lengths(quality.at("checks"), "check", network);
-    for (const char* frame : {"UG", "LG"}) network.datums.emplace_back(frame, datum_words(quality.at(frame)));
-    std::map<std::string, std::string> words;
-    for (const Json& row : quality.at("photographs")) {
-      words[row.at("photo").get<std::string>()] = row.at("words").get<std::string>();
-    }
-    for (PhotographPart& photograph : network.photographs) {
-      if (photograph.status == "ok") photograph.remarks = words[photograph.name];
-    }
-  } catch (const Json::exception& error) {
-    throw InputError(fmt::format("{}: {}", path.string(), error.what()));
+  Quality quality = read_quality(path);
+  network.sigma0 = quality.sigma0;
+  network.rms_px = quality.rms_px;
+  network.redundancy = quality.redundancy;
+  network.warnings = std::move(quality.warnings);
+  add_lengths(quality.bars, "bar", network);
+  add_lengths(quality.checks, "check", network);
+  network.datums = {{"UG", datum_words(quality.UG)}, {"LG", datum_words(quality.LG)}};
+  for (PhotographPart& photograph : network.photographs) {
+    if (photograph.status == "ok") photograph.remarks = quality.photograph_words[photograph.name];
   }
-}
-
-struct Station {
-  std::string photograph, pose;
-  Rigid3 UG_from_camera;
-};
-
-std::vector<Station> read_photographs(const fs::path& path, NetworkPart& network) {
-  const CsvTable table = CsvTable::read(path);
-  std::vector<Station> stations;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    PhotographPart photograph;
-    photograph.name = table.text(row, "photo");
-    photograph.pose_id = table.text(row, "pose");
-    photograph.status = table.text(row, "status");
-    photograph.markers = table.integer(row, "markers");
-    photograph.rejected = table.integer(row, "rejected");
-    photograph.rms_px = table.number(row, "rms_px");
-    if (table.optional_number(row, kPoseColumns[0])) {
-      Vector6d v;
-      for (std::size_t i = 0; i < 6; ++i)
-        v[static_cast<Eigen::Index>(i)] = table.number(row, kPoseColumns[i]) * pose_column_unit(i);
-      stations.push_back({photograph.name, photograph.pose_id, home_from_lg(Pose::from_vector(v))});
-    }
-    network.photographs.push_back(std::move(photograph));
-  }
-  return stations;
 }
 
 void add_residuals(const fs::path& path, NetworkPart& network) {
@@ -143,12 +98,9 @@ struct MarkerSet {
 };
 
 MarkerSet read_markers(const fs::path& path) {
-  const CsvTable table = CsvTable::read(path);
   std::map<std::pair<std::string, int>, std::map<int, Eigen::Vector3d>> corners;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    corners[{table.text(row, "frame"), table.integer(row, "id")}][table.integer(row, "corner")] = {
-        table.number(row, "x_mm"), table.number(row, "y_mm"), table.number(row, "z_mm")};
-  }
+  for (const MarkerCornerRecord& record : read_marker_table(path))
+    corners[{record.frame, record.id}][record.corner] = record.xyz_mm;
   MarkerSet markers;
   for (const auto& [key, points] : corners) {
     SceneMarker marker;
@@ -242,7 +194,16 @@ NetworkPart read_network_part(const Campaign& campaign, const CampaignReport& re
                               const PlatformGeometry* machine) {
   const fs::path results = campaign.folder / "results";
   NetworkPart network;
-  const std::vector<Station> stations = read_photographs(results / "photos.csv", network);
+  const std::vector<PhotoRecord> photos = read_photo_table(results / "photos.csv");
+  for (const PhotoRecord& photo : photos) {
+    PhotographPart& part = network.photographs.emplace_back();
+    part.pose_id = photo.pose;
+    part.name = photo.photo;
+    part.status = photo.status;
+    part.markers = photo.markers;
+    part.rejected = photo.rejected;
+    part.rms_px = photo.rms_px;
+  }
   add_residuals(results / "residuals.csv", network);
   add_quality(results / "quality.json", network);
   const MarkerSet markers = read_markers(results / "markers.csv");
@@ -260,11 +221,10 @@ NetworkPart read_network_part(const Campaign& campaign, const CampaignReport& re
   for (PhotographPart& photograph : network.photographs)
     photograph.size_px = {camera.width_px, camera.height_px};
   const auto directions = corner_directions(camera);
-  for (const Station& station : stations) {
-    const auto pose = std::ranges::find(network.scene.poses, station.pose, &ScenePose::id);
-    if (pose == network.scene.poses.end()) continue;
-    pose->cameras.push_back(
-        {fs::path(station.photograph).stem().string(), station.UG_from_camera, directions});
+  for (const PhotoRecord& photo : photos) {
+    const auto pose = std::ranges::find(network.scene.poses, photo.pose, &ScenePose::id);
+    if (pose == network.scene.poses.end() || !photo.UG_from_camera) continue;
+    pose->cameras.push_back({fs::path(photo.photo).stem().string(), *photo.UG_from_camera, directions});
   }
   network.scene.ellipsoid_scale = ellipsoid_scale(network.scene);
   return network;

@@ -6,13 +6,13 @@
 
 #include "kinematics/geometry/input_error.h"
 #include "tools/hexcal/network_part.h"
-#include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/calibration_record.h"
 #include "tools/io/camera_file.h"
 #include "tools/io/campaign_file.h"
 #include "tools/io/hexapod_file.h"
 #include "tools/io/observation_table.h"
+#include "tools/io/version.h"
 
 namespace hexcal {
 namespace {

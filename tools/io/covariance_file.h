@@ -1,6 +1,8 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
+#include <vector>
 
 #include "pose_extract/extract_poses.h"
 
@@ -14,16 +16,12 @@ inline constexpr int kMaxCorrelatedPoses = 300;
 /// of the poses, up to kMaxCorrelatedPoses poses. A pose without numbers has no rows.
 [[nodiscard]] std::string format_pose_covariances(const std::string& head, const CampaignResult& result);
 
-/// Camera stations: photo,pose,status,x_mm,...,yaw_deg,sigma_x_mm,...,sigma_yaw_deg,markers,rejected,rms_px
-/// of UG_from_camera.
-[[nodiscard]] std::string format_photo_poses(const std::string& head,
-                                             const CampaignObservations& observations,
-                                             const CampaignResult& result);
-
-/// Marker corners: id,corner,frame,x_mm,y_mm,z_mm,sigma_x_mm,...; frame UG or LG.
-[[nodiscard]] std::string format_marker_points(const std::string& head, const CampaignResult& result);
-
-/// Where each corner of the moving grip was in UG at each epoch: pose,id,corner,x_mm,y_mm,z_mm.
-[[nodiscard]] std::string format_epoch_table(const std::string& head, const CampaignResult& result);
+/// The block of two poses: covariance of (x, y, z, roll, pitch, yaw) of `a` with that of `b`, mm and rad.
+struct PoseCovariance {
+  std::string a, b;
+  Matrix6d covariance;
+};
+/// Throws InputError as CsvTable does.
+[[nodiscard]] std::vector<PoseCovariance> read_pose_covariances(const std::filesystem::path& path);
 
 }  // namespace hexcal

@@ -6,40 +6,29 @@
 #include <utility>
 
 #include "kinematics/geometry/input_error.h"
-#include "tools/io/csv_table.h"
-#include "tools/io/pose_table.h"
+#include "tools/io/marker_table.h"
+#include "tools/io/photo_table.h"
 
 namespace hexcal {
+
 MeasuredNetwork read_measured_network(const std::filesystem::path& results) {
   MeasuredNetwork network;
-  const CsvTable photos = CsvTable::read(results / "photos.csv");
-  std::vector<std::string> columns(kPoseColumns.begin(), kPoseColumns.end());
-  columns.emplace_back("pose");
-  photos.require_columns(columns);
-  for (std::size_t row = 0; row < photos.rows(); ++row) {
-    if (!photos.optional_number(row, "x_mm")) continue;
-    Vector6d v;
-    for (std::size_t i = 0; i < 6; ++i)
-      v[static_cast<Eigen::Index>(i)] = photos.number(row, kPoseColumns[i]) * pose_column_unit(i);
-    network.stations[photos.text(row, "pose")].push_back(home_from_lg(Pose::from_vector(v)));
+  for (const PhotoRecord& photo : read_photo_table(results / "photos.csv")) {
+    if (photo.UG_from_camera) network.stations[photo.pose].push_back(*photo.UG_from_camera);
   }
   if (network.stations.empty())
-    throw InputError(fmt::format("{}: no photograph has a place", photos.path().string()));
+    throw InputError(fmt::format("{}: no photograph has a place", (results / "photos.csv").string()));
 
-  const CsvTable points = CsvTable::read(results / "markers.csv");
-  points.require_columns({"id", "corner", "frame", "x_mm", "y_mm", "z_mm"});
   std::map<int, std::set<int>> corners;
-  for (std::size_t row = 0; row < points.rows(); ++row) {
-    const int corner = points.integer(row, "corner");
-    if (points.text(row, "frame") != "LG" || corner < 0 || corner > 3) continue;
-    const int id = points.integer(row, "id");
-    corners[id].insert(corner);
-    network.moving_markers[id][static_cast<std::size_t>(corner)] = {
-        points.number(row, "x_mm"), points.number(row, "y_mm"), points.number(row, "z_mm")};
+  for (const MarkerCornerRecord& record : read_marker_table(results / "markers.csv")) {
+    if (record.frame != "LG" || record.corner < 0 || record.corner > 3) continue;
+    corners[record.id].insert(record.corner);
+    network.moving_markers[record.id][static_cast<std::size_t>(record.corner)] = record.xyz_mm;
   }
   std::erase_if(network.moving_markers, [&](const auto& marker) { return corners[marker.first].size() < 4; });
   if (network.moving_markers.empty())
-    throw InputError(fmt::format("{}: no marker of LG with four corners", points.path().string()));
+    throw InputError(
+        fmt::format("{}: no marker of LG with four corners", (results / "markers.csv").string()));
   return network;
 }
 

@@ -11,6 +11,7 @@
 #include "kinematics/geometry/input_error.h"
 #include "kinematics/geometry/median.h"
 #include "kinematics/inverse.h"
+#include "tools/io/covariance_file.h"
 #include "tools/io/csv_table.h"
 #include "tools/io/pose_table.h"
 
@@ -79,27 +80,17 @@ bool read_sigma(const CsvTable& table, std::size_t row, PoseObservation& pose) {
 }
 
 void read_covariance(const fs::path& path, ObservationSet& set) {
-  const CsvTable table = CsvTable::read(path);
-  std::vector<std::string> names;
-  for (int r = 1; r <= 6; ++r)
-    for (int c = 1; c <= 6; ++c) names.push_back(fmt::format("c{}{}", r, c));
-  std::vector<std::string> required{"pose_a", "pose_b"};
-  required.insert(required.end(), names.begin(), names.end());
-  table.require_columns(required);
   std::map<std::string, Eigen::Index> index;
   for (std::size_t i = 0; i < set.poses.size(); ++i) index[set.poses[i].id] = static_cast<Eigen::Index>(i);
   std::set<std::string> seen;
   const auto n = static_cast<Eigen::Index>(set.poses.size());
   const bool joint = set.poses.size() <= kMostJointPoses;
   if (joint) set.joint_covariance.setZero(6 * n, 6 * n);
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const auto a = index.find(table.text(row, "pose_a"));
-    const auto b = index.find(table.text(row, "pose_b"));
+  for (const PoseCovariance& entry : read_pose_covariances(path)) {
+    const auto a = index.find(entry.a);
+    const auto b = index.find(entry.b);
     if (a == index.end() || b == index.end()) continue;
-    Matrix6d block;
-    for (Eigen::Index r = 0; r < 6; ++r)
-      for (Eigen::Index c = 0; c < 6; ++c)
-        block(r, c) = table.number(row, names[static_cast<std::size_t>(6 * r + c)]);
+    Matrix6d block = entry.covariance;
     if (a == b) {
       seen.insert(a->first);
       block = (0.5 * (block + block.transpose())).eval();

@@ -3,10 +3,10 @@
 
 #include "calibration/calibrate.h"
 #include "kinematics/geometry/input_error.h"
-#include "tools/hexcal/version.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/model_file.h"
 #include "tools/io/observation_table.h"
+#include "tools/io/version.h"
 #include "tools/python/arrays.h"
 
 namespace hexcal::python {

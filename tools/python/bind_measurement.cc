@@ -1,6 +1,7 @@
 #include <pybind11/stl.h>
 
-#include "tools/hexcal/campaign_measurement.h"
+#include "tools/campaign/campaign_lock.h"
+#include "tools/campaign/measure_campaign.h"
 #include "tools/python/arrays.h"
 
 namespace hexcal::python {
@@ -28,10 +29,7 @@ Measurement measure(const std::filesystem::path& campaign,
   OpenCampaign open = open_campaign(request);
   std::optional<CampaignLock> lock;
   if (cache && !observations) lock.emplace(open.results);
-  const CampaignObservations seen =
-      observations ? campaign_observations(*observations, open) : observe_campaign(request, open, {});
-  CampaignResult result = extract_poses(open.campaign, seen, extract_options(request));
-  judge_against_files(open, result);
+  const CampaignResult result = measure_campaign(request, std::move(open)).result;
   Measurement out;
   out.warnings = result.warnings;
   out.poses.setConstant(static_cast<Eigen::Index>(result.poses.size()), 6, std::nan(""));

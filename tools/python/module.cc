@@ -1,7 +1,7 @@
 #include <pybind11/pybind11.h>
 
 #include "kinematics/geometry/input_error.h"
-#include "tools/hexcal/version.h"
+#include "tools/io/version.h"
 #include "tools/python/arrays.h"
 
 // NOLINTNEXTLINE: the macro declares what Python loads

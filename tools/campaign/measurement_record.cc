@@ -1,4 +1,4 @@
-#include "tools/hexcal/measurement_record.h"
+#include "tools/campaign/measurement_record.h"
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -30,16 +30,25 @@ std::string circumstances(const MeasureRequest& request, const OpenCampaign& ope
   if (request.observations) return sha256_hex(text);
   const ImageListing& listing = open.listing;
   for (const std::string& pose : listing.poses) text += fmt::format("{}\n", pose);
-  for (std::size_t i = 0; i < listing.images.size(); ++i) {
-    const CampaignImage& image = listing.images[i];
-    text +=
-        fmt::format("{} {} {} {}\n", image.name, image.pose, image.path.string(), open.camera_of_image[i]);
+  for (const CampaignImage& image : listing.images) {
+    text += fmt::format("{} {} {} {}\n", image.name, image.pose, image.path.string(), image.folder);
   }
   for (const SkippedFile& file : listing.skipped) text += fmt::format("{}: {}\n", file.name, file.reason);
   return sha256_hex(text);
 }
 
-// The program itself and all that open_campaign and judge_against_files read.
+// SHA-256 of a file's content; empty if it cannot be read (whoever needs the content says why).
+std::string hash_if_readable(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return {};
+  try {
+    return sha256_hex(read_file(path));
+  } catch (const InputError&) {  // no right to read it, or it is gone since
+    return {};
+  }
+}
+
+// The program itself and all that open_campaign and the judging of a measurement read.
 std::vector<fs::path> files_read(const MeasureRequest& request, const OpenCampaign& open) {
   std::vector<fs::path> files = measurement_inputs(request, open);
   files.emplace_back("/proc/self/exe");

@@ -1,4 +1,4 @@
-#include "tools/hexcal/capture_groups.h"
+#include "tools/campaign/capture_groups.h"
 
 #include <fmt/format.h>
 

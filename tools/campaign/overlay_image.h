@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "tools/hexcal/campaign_measurement.h"
+#include "tools/campaign/open_campaign.h"
 
 namespace hexcal {
 

@@ -1,4 +1,4 @@
-#include "tools/hexcal/overlay_image.h"
+#include "tools/campaign/overlay_image.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "tools/hexcal/folder_watch.h"
+#include "tools/campaign/folder_watch.h"
 
 #include <poll.h>
 #include <sys/inotify.h>

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/hexcal/campaign_measurement.h"
+#include "tools/campaign/open_campaign.h"
 
 namespace hexcal {
 

@@ -1,0 +1,103 @@
+#include "tools/hexcal/measurement_text.h"
+
+#include <fmt/format.h>
+
+#include "tools/hexcal/command.h"
+#include "tools/hexcal/terminal.h"
+#include "tools/io/measured_poses.h"
+
+namespace hexcal {
+namespace {
+
+std::string length_line(const char* kind, const MeasuredLength& length) {
+  const auto name = [](const MarkerPoint& point) {
+    return point.corner < 0 ? fmt::format("{}", point.id) : fmt::format("{}.{}", point.id, point.corner);
+  };
+  if (!length.measured)
+    return fmt::format("{} {}-{}: not measured\n", kind, name(length.known.a), name(length.known.b));
+  return fmt::format("{} {}-{}: measured {:.4f} mm (sigma {:.4f}), stated {:.4f}, difference {:+.4f} mm\n",
+                     kind, name(length.known.a), name(length.known.b), length.length_mm, length.sigma_mm,
+                     length.known.length_mm, length.length_mm - length.known.length_mm);
+}
+
+}  // namespace
+
+std::string measurement_text(const CampaignMeasurement& measurement) {
+  const auto& [open, observations, result] = measurement;
+  std::string out;
+  TextTable table({"pose", "x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg", "sigma_um",
+                   "sigma_mdeg", "photos", "markers", "rms_px", "status"});
+  table.align_left(12);
+  int bad = 0;
+  int suspects = 0;
+  for (const MeasuredPose& pose : result.poses) {
+    std::vector<std::string> cells{pose.id};
+    const bool ok = pose.status == PoseStatus::ok;
+    for (int i = 0; i < 6; ++i) {
+      const double unit = i < 3 ? 1.0 : kRadPerDeg;
+      cells.push_back(pose.pose ? fmt::format("{:.4f}", pose.pose->vector()[i] / unit) : "");
+    }
+    if (pose.pose) {
+      const Vector6d sigma = pose_sigmas(pose);
+      cells.push_back(fmt::format("{:.2f}", sigma.head<3>().maxCoeff() * 1e3));
+      cells.push_back(fmt::format("{:.2f}", sigma.tail<3>().maxCoeff() * kDegPerRad * 1e3));
+    } else {
+      cells.insert(cells.end(), {"", ""});
+    }
+    cells.push_back(fmt::format("{}", pose.images));
+    cells.push_back(fmt::format("{}", pose.markers));
+    cells.push_back(pose.pose ? fmt::format("{:.4f}", pose.rms_px) : "");
+    std::string words = status_text(pose);
+    if (ok && !pose.words.empty()) words += " (" + pose.words + ")";
+    cells.push_back(words);
+    const bool doubtful = pose.status == PoseStatus::suspect || (ok && !pose.words.empty());
+    table.add_row(std::move(cells), doubtful ? Colour::warning : ok ? Colour::plain : Colour::bad);
+    bad += ok ? 0 : 1;
+    suspects += pose.status == PoseStatus::suspect ? 1 : 0;
+  }
+  if (!result.poses.empty()) out += table.text();
+  const AdjustmentResult& adjusted = result.adjusted;
+  int used = 0;
+  std::size_t worst = 0;
+  for (std::size_t p = 0; p < result.photographs.size(); ++p) {
+    const MeasuredPhotograph& photograph = result.photographs[p];
+    if (is_used(photograph.status)) ++used;
+    if (photograph.residuals.worst_px > result.photographs[worst].residuals.worst_px) worst = p;
+    if (photograph.status != PhotoStatus::ok) {
+      out += fmt::format("photograph {}: {}: {}\n", observations.photographs[p].seen.name,
+                         photo_status_name(photograph.status), photograph.words);
+    } else if (!photograph.words.empty()) {
+      out += fmt::format("photograph {}: {}\n", observations.photographs[p].seen.name, photograph.words);
+    }
+  }
+  for (const SkippedFile& file : open.listing.skipped)
+    out += fmt::format("not used: {}: {}\n", file.name, file.reason);
+  for (const MeasuredLength& bar : result.bars) out += length_line("bar", bar);
+  for (const MeasuredLength& check : result.checks) out += length_line("check", check);
+  for (const std::string& warning : result.warnings) out += fmt::format("warning: {}\n", warning);
+  out += fmt::format("{} of {} poses{}, {} of {} photographs",
+                     result.poses.size() - static_cast<std::size_t>(bad), result.poses.size(),
+                     suspects > 0 ? fmt::format(" ({} more are suspect)", suspects) : "", used,
+                     result.photographs.size());
+  if (!result.photographs.empty() && adjusted.redundancy_total > 0) {
+    out += fmt::format(
+        "; sigma0 {:.3f} at redundancy {:.0f}, rms {:.4f} px, worst corner {:.4f} px in {}; markers {}",
+        adjusted.sigma0, adjusted.redundancy_total, adjusted.rms_px,
+        result.photographs[worst].residuals.worst_px, observations.photographs[worst].seen.name,
+        adjusted.shape_free ? "with free corners" : "as rigid squares");
+  }
+  return out + "\n";
+}
+
+int measurement_exit_code(const CampaignResult& result) {
+  for (const MeasuredPose& pose : result.poses) {
+    // In a plain photogrammetry project folders are no poses.
+    if (pose.status != PoseStatus::ok && result.has_moving) return kSomeFailed;
+  }
+  for (const MeasuredPhotograph& photograph : result.photographs) {
+    if (photograph.status != PhotoStatus::ok) return kSomeFailed;
+  }
+  return result.adjusted.status == AdjustmentStatus::ok ? kDone : kSomeFailed;
+}
+
+}  // namespace hexcal
