@@ -10,6 +10,7 @@
 
 #include "kinematics/geometry/covariance.h"
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/geometry/nearest_name.h"
 #include "photogrammetry/adjustment/marker_map.h"
 #include "pose_extract/photograph_screening.h"
 #include "pose_extract/pose_verdict.h"
@@ -74,7 +75,7 @@ void choose_scale(const Campaign& campaign, CampaignResult& result, AdjustmentOp
   options.print_scale_sigma = campaign.print_scale_sigma;
   if (options.print_scale_free && result.network.lengths.empty()) {
     options.print_scale_free = false;
-    result.warnings.emplace_back("no scale bar was measured: the scale is that of the markers' sizes");
+    result.findings.emplace_back("no scale bar was measured: the scale is that of the markers' sizes");
   }
 }
 
@@ -120,13 +121,13 @@ std::string print_scale_words(double larger, double sigma, const char* source) {
 
 // Nominal coordinates beside another source of scale: do they agree?
 void compare_nominal_scale(const CampaignResult& base, const std::optional<FrameRule>& rule, Body body,
-                           const char* name, std::vector<std::string>& warnings) {
+                           const char* name, std::vector<Finding>& findings) {
   if (!rule || rule->from != FrameRule::From::nominal) return;
   const DatumFrame scaled = frame_from_nominal(base.network, base.adjusted, body, rule->nominal, true);
   if (!scaled.ok) return;
   const double sigma = scale_sigma(base, scaled);
   if (std::abs(scaled.scale - 1) <= kScaleDisagreementSigmas * sigma) return;
-  warnings.push_back(
+  findings.push_back(
       fmt::format("{}'s nominal coordinates are {:.4f} % larger than measured (sigma {:.4f} %): they "
                   "disagree with the scale used",
                   name, (scaled.scale - 1) * 100, sigma * 100));
@@ -316,20 +317,31 @@ Matrix6d CampaignResult::pose_covariance(std::size_t a, std::size_t b) const {
   return covariance;
 }
 
+std::string find_home(const Campaign& campaign, const std::vector<std::string>& poses) {
+  const std::string& wanted = campaign.lg->home_pose;
+  if (std::ranges::find(poses, wanted) != poses.end()) return wanted;
+  if (const auto meant = nearest_name(wanted, poses, 1)) return *meant;
+  throw InputError(
+      fmt::format("{}: frames.LG.pose: found '{}', which is none of the poses: {}; photograph the home as "
+                  "'{}', or let another "
+                  "pose be the home: --home POSE",
+                  campaign.file.string(), wanted, fmt::join(poses, ", "), wanted));
+}
+
 CampaignResult extract_poses(const Campaign& campaign, const CampaignObservations& observations,
                              const ExtractOptions& options) {
   options.validate();
   CampaignResult result;
   const bool from_home = campaign.lg && campaign.lg->from == FrameRule::From::home;
   if (from_home) {
-    const auto found =
-        std::find(observations.poses.begin(), observations.poses.end(), campaign.lg->home_pose);
-    if (found == observations.poses.end()) {
-      throw InputError(fmt::format("{}: frames.LG.pose: found '{}', which is none of the poses: {}",
-                                   campaign.file.string(), campaign.lg->home_pose,
-                                   fmt::join(observations.poses, ", ")));
+    const std::string home = find_home(campaign, observations.poses);
+    if (home != campaign.lg->home_pose) {
+      result.findings.emplace_back(fmt::format("frames.LG.pose: '{}' is none of the poses; '{}' was taken",
+                                               campaign.lg->home_pose, home),
+                                   fmt::format("write it as {} in campaign.yaml", home));
     }
-    result.home_epoch = static_cast<int>(found - observations.poses.begin());
+    result.home_epoch =
+        static_cast<int>(std::ranges::find(observations.poses, home) - observations.poses.begin());
   }
   result.has_moving = !campaign.moving.empty();
   if (campaign.lg) result.gd_mm = campaign.lg->gd_mm;
@@ -346,11 +358,11 @@ CampaignResult extract_poses(const Campaign& campaign, const CampaignObservation
   for (std::size_t e = 0; e < result.poses.size(); ++e) result.poses[e].id = observations.poses[e];
   judge_photographs(observations, result);
   if (result.adjusted.status == AdjustmentStatus::nothing_connected) {
-    result.warnings.push_back(result.adjusted.reason);
-    judge_poses(campaign, observations, options, result);
+    result.findings.push_back(result.adjusted.reason);
+    judge_poses(observations, options, result);
     return result;
   }
-  if (result.adjusted.status != AdjustmentStatus::ok) result.warnings.push_back(result.adjusted.reason);
+  if (result.adjusted.status != AdjustmentStatus::ok) result.findings.push_back(result.adjusted.reason);
 
   const bool nominal_scale = campaign.scale == ScaleFrom::nominal;
   const bool by_ug = nominal_scale && campaign.ug && campaign.ug->from == FrameRule::From::nominal;
@@ -371,10 +383,10 @@ CampaignResult extract_poses(const Campaign& campaign, const CampaignObservation
     sizes = print_scale_words(result.adjusted.geometry.print_scale,
                               std::sqrt(result.adjusted.common_covariance(i, i)), "bars");
   }
-  if (!sizes.empty()) result.warnings.push_back(sizes);
+  if (!sizes.empty()) result.findings.push_back(sizes);
   if (!nominal_scale) {
-    compare_nominal_scale(result, campaign.ug, Body::fixed, "UG", result.warnings);
-    compare_nominal_scale(result, campaign.lg, Body::moving, "LG", result.warnings);
+    compare_nominal_scale(result, campaign.ug, Body::fixed, "UG", result.findings);
+    compare_nominal_scale(result, campaign.lg, Body::moving, "LG", result.findings);
   }
   if (from_home && result.UG.ok) {
     const auto home = static_cast<std::size_t>(result.home_epoch);
@@ -386,7 +398,7 @@ CampaignResult extract_poses(const Campaign& campaign, const CampaignObservation
       result.LG.frame_from_body = Rigid3::from_translation({0, 0, campaign.lg->gd_mm}) * y;
       result.LG.by_common = Eigen::Matrix<double, 7, Eigen::Dynamic>::Zero(7, result.adjusted.layout.size);
     } else {
-      result.LG.reason = fmt::format("the home pose '{}' was not measured", campaign.lg->home_pose);
+      result.LG.reason = fmt::format("the home pose '{}' was not measured", observations.poses[home]);
     }
   }
   if (result.UG.ok && result.LG.ok) {
@@ -410,7 +422,7 @@ CampaignResult extract_poses(const Campaign& campaign, const CampaignObservation
   for (const KnownLength& check : campaign.checks) result.checks.push_back(measure_length(result, check));
   measure_points(result);
   measure_stations(result);
-  judge_poses(campaign, observations, options, result);
+  judge_poses(observations, options, result);
   judge_campaign(campaign, result);
   return result;
 }

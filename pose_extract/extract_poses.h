@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "camera_calib/calibrated_camera.h"
+#include "kinematics/geometry/finding.h"
 #include "photogrammetry/adjustment/adjustment.h"
 #include "photogrammetry/markers/detect.h"
 #include "pose_extract/campaign.h"
@@ -90,6 +91,10 @@ struct MeasuredPhotograph {
   std::optional<Rigid3> UG_from_camera;
   Matrix6d covariance = Matrix6d::Zero();  ///< perturbation of UG_from_camera (covariance.h)
   ResidualSummary residuals;
+  /// The markers of one grip fit, those of the other do not: it does not show its pose; `shows_pose` names
+  /// the one that it shows where there is such.
+  bool contradicts_pose = false;
+  std::optional<std::string> shows_pose;
 };
 
 /// Pose of LG relative to its home.
@@ -103,7 +108,7 @@ struct MeasuredPose {
   int markers = 0;                         ///< different markers of the moving body used
   double rms_px = 0;
   double intersection_deg =
-      0;  ///< median over its moving markers of the largest angle between lines of sight
+      0;  ///< largest angle between its photographs' lines of sight to the moving markers
 };
 
 struct MeasuredLength {
@@ -128,7 +133,7 @@ struct CampaignResult {
   std::vector<MeasuredPhotograph> photographs;
   std::vector<MeasuredLength> bars, checks;
   std::vector<MeasuredPoint> points;
-  std::vector<std::string> warnings;  ///< of the campaign as a whole
+  std::vector<Finding> findings;  ///< about the campaign as a whole
 
   /// Covariance of the parameters (mm, rad) of two poses by index; zero if one has no pose.
   [[nodiscard]] Matrix6d pose_covariance(std::size_t a, std::size_t b) const;
@@ -146,6 +151,10 @@ struct CampaignResult {
   double gd_mm = 0;                       ///< of LG's rule
   int home_epoch = -1;                    ///< LG from home: the pose that defines it
 };
+
+/// The pose that LG's rule calls home: the one of this name, or else the one that is meant by it (home for
+/// Home, one letter off). Throws InputError, with the way on, where there is none. Wants campaign.lg.
+[[nodiscard]] std::string find_home(const Campaign& campaign, const std::vector<std::string>& poses);
 
 /// Never throws for bad photographs: see the statuses. Throws InputError when options are invalid or the home
 /// pose is none of the poses.

@@ -1,39 +1,22 @@
 #include "pose_extract/pose_verdict.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <set>
 
+#include "kinematics/geometry/median.h"
 #include "photogrammetry/adjustment/planar_pose.h"
+#include "pose_extract/misplaced_photographs.h"
 
 namespace hexcal {
 namespace {
 
 // Rise of the sum of squares below which the flipped pose stays possible.
 constexpr double kAmbiguousSigmas2 = 30;
-// Residuals over what the photographs promise, beyond which something is wrong with the whole: real lenses
-// and prints stay below 2.
-constexpr double kSuspectSigma0 = 3;
-
-// A pair counts as swapped when it fits so many times better that way: machines are wrong by centimetres, but
-// neighbouring poses not in opposite directions.
-constexpr double kSwappedFitsBetter = 3;
-constexpr double kLeverMm = 100;  // what a radian of rotation counts for
-
-double pose_gap_mm(const Pose& a, const Pose& b) {
-  const Rigid3 between = inverse(home_from_lg(a)) * home_from_lg(b);
-  return (a.position_mm - b.position_mm).norm() +
-         kLeverMm * rotation_vector_from_quaternion(between.rotation).norm();
-}
-
-void add_words(std::string& words, const std::string& more) {
-  if (!words.empty()) words += "; ";
-  words += more;
-}
+// Photographs whose residuals are so many times the campaign's median, and poses whose sigma is, are named.
+constexpr double kFarAboveMedian = 3;
 
 // What the epoch's sightings amount to.
 struct EpochEvidence {
@@ -80,32 +63,23 @@ bool flipped_pose_fits(const CampaignResult& result, const Sighting& sighting) {
          kAmbiguousSigmas2 * variance;
 }
 
-// Median over the epoch's moving markers of the largest angle between two lines of sight, degrees.
-double intersection_angle(const CampaignResult& result, std::size_t epoch) {
+// Largest angle between two photographs' lines of sight to the middle of the epoch's moving markers, degrees.
+double intersection_angle(const CampaignResult& result, std::size_t epoch, const EpochEvidence& evidence) {
+  if (evidence.markers.empty()) return 0;
   const NetworkGeometry& geometry = result.adjusted.geometry;
-  std::map<int, std::vector<Eigen::Vector3d>> rays;
-  for (const Sighting& sighting : result.adjusted.sightings) {
-    if (sighting.status != SightingStatus::used) continue;
-    const auto p = static_cast<std::size_t>(sighting.photo);
-    const auto m = static_cast<std::size_t>(sighting.marker);
-    if (static_cast<std::size_t>(result.network.photos[p].epoch) != epoch) continue;
-    if (result.network.markers[m].body != Body::moving) continue;
-    const Eigen::Vector3d at = geometry.fixed_from_moving[epoch] * geometry.body_from_marker[m].translation;
-    rays[sighting.marker].push_back((at - inverse(geometry.camera_from_fixed[p]).translation).normalized());
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const int m : evidence.markers)
+    middle += geometry.body_from_marker[static_cast<std::size_t>(m)].translation;
+  middle = geometry.fixed_from_moving[epoch] * (middle / static_cast<double>(evidence.markers.size()));
+  std::vector<Eigen::Vector3d> lines;
+  for (const int p : evidence.photos)
+    lines.push_back(middle - inverse(geometry.camera_from_fixed[static_cast<std::size_t>(p)]).translation);
+  double angle = 0;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    for (std::size_t j = i + 1; j < lines.size(); ++j)
+      angle = std::max(angle, std::atan2(lines[i].cross(lines[j]).norm(), lines[i].dot(lines[j])));
   }
-  std::vector<double> largest;
-  for (const auto& [marker, lines] : rays) {
-    double angle = 0;
-    for (std::size_t i = 0; i < lines.size(); ++i) {
-      for (std::size_t j = i + 1; j < lines.size(); ++j) {
-        angle = std::max(angle, std::atan2(lines[i].cross(lines[j]).norm(), lines[i].dot(lines[j])));
-      }
-    }
-    largest.push_back(angle);
-  }
-  if (largest.empty()) return 0;
-  std::sort(largest.begin(), largest.end());
-  return largest[largest.size() / 2] * kDegPerRad;
+  return angle * kDegPerRad;
 }
 
 // Status from what was photographed, before any pose is looked at.
@@ -135,8 +109,8 @@ PoseStatus status_of_photographs(const CampaignObservations& observations, const
   return usable == 0 ? PoseStatus::no_usable_photographs : PoseStatus::ok;
 }
 
-void judge_pose(const Campaign& campaign, const ExtractOptions& options, const EpochEvidence& evidence,
-                std::size_t epoch, const CampaignResult& result, MeasuredPose& pose) {
+void judge_pose(const ExtractOptions& options, const EpochEvidence& evidence, std::size_t epoch,
+                const CampaignResult& result, MeasuredPose& pose) {
   const NetworkGeometry& geometry = result.adjusted.geometry;
   if (pose.status != PoseStatus::ok) return;
   if (evidence.moving_used == 0 && evidence.moving_rejected == 0 && !geometry.has_epoch[epoch]) {
@@ -178,6 +152,17 @@ void judge_pose(const Campaign& campaign, const ExtractOptions& options, const E
               fmt::format("sigma {:.3g} mm, wanted at most {} mm", sigma_mm, options.max_sigma_mm));
     return;
   }
+  // Whose photographs contradict each other: a majority may be as wrong as one.
+  for (std::size_t p = 0; p < result.photographs.size(); ++p) {
+    const MeasuredPhotograph& photograph = result.photographs[p];
+    if (static_cast<std::size_t>(result.network.photos[p].epoch) != epoch || !photograph.contradicts_pose)
+      continue;
+    if (!photograph.shows_pose) {
+      suspect(pose, "its photographs contradict each other, and which are right is not known");
+    } else if (evidence.photos.size() < 2) {
+      suspect(pose, "a single photograph is left of it");
+    }
+  }
   if (evidence.photos.size() == 1) {
     add_words(pose.words, "one photograph only");
   } else if (pose.intersection_deg < options.min_intersection_deg) {
@@ -186,59 +171,13 @@ void judge_pose(const Campaign& campaign, const ExtractOptions& options, const E
   if (evidence.moving_rejected > 0) {
     add_words(pose.words, fmt::format("{} sightings of moving markers left out", evidence.moving_rejected));
   }
-  (void)campaign;
 }
 
 }  // namespace
 
-const char* photo_status_name(PhotoStatus status) {
-  switch (status) {
-    case PhotoStatus::ok:
-      return "ok";
-    case PhotoStatus::suspect:
-      return "suspect";
-    case PhotoStatus::unreadable:
-      return "unreadable";
-    case PhotoStatus::wrong_camera:
-      return "wrong_camera";
-    case PhotoStatus::duplicate:
-      return "duplicate";
-    case PhotoStatus::no_markers:
-      return "no_markers";
-    case PhotoStatus::disconnected:
-      return "disconnected";
-    case PhotoStatus::disagrees:
-      return "disagrees";
-  }
-  return "unknown";
-}
-
-const char* pose_status_name(PoseStatus status) {
-  switch (status) {
-    case PoseStatus::ok:
-      return "ok";
-    case PoseStatus::suspect:
-      return "suspect";
-    case PoseStatus::no_photographs:
-      return "no_photographs";
-    case PoseStatus::no_usable_photographs:
-      return "no_usable_photographs";
-    case PoseStatus::same_photographs:
-      return "same_photographs";
-    case PoseStatus::no_moving_markers:
-      return "no_moving_markers";
-    case PoseStatus::disconnected:
-      return "disconnected";
-    case PoseStatus::ambiguous:
-      return "ambiguous";
-    case PoseStatus::weak_geometry:
-      return "weak_geometry";
-    case PoseStatus::contradictory:
-      return "contradictory";
-    case PoseStatus::no_datum:
-      return "no_datum";
-  }
-  return "unknown";
+void add_words(std::string& words, const std::string& more) {
+  if (!words.empty()) words += "; ";
+  words += more;
 }
 
 void suspect(MeasuredPose& pose, const std::string& words) {
@@ -251,7 +190,81 @@ void suspect(MeasuredPhotograph& photograph, const std::string& words) {
   add_words(photograph.words, words);
 }
 
+namespace {
+
+// Photographs whose markers of one body were all rejected while those of the other fit: they show another
+// pose.
+void judge_misplaced(const CampaignObservations& observations, CampaignResult& result) {
+  for (const MisplacedPhotograph& misplaced : misplaced_photographs(result)) {
+    MeasuredPhotograph& photograph = result.photographs[misplaced.photo];
+    if (!is_used(photograph.status)) continue;
+    photograph.contradicts_pose = true;
+    const std::string& own = observations.photographs[misplaced.photo].pose;
+    const std::string& name = observations.photographs[misplaced.photo].seen.name;
+    if (misplaced.epoch) {
+      photograph.shows_pose = observations.poses[*misplaced.epoch];
+      suspect(photograph, fmt::format("it shows pose {}", *photograph.shows_pose));
+      result.findings.emplace_back(
+          fmt::format("photograph {} shows pose {}, not {}", name, *photograph.shows_pose, own),
+          fmt::format("move it to the folder of {}", *photograph.shows_pose), Severity::bad);
+    } else {
+      suspect(photograph, "its grips stand otherwise than in the other photographs of its pose");
+      result.findings.emplace_back(
+          fmt::format("photograph {} contradicts the others of pose {}, and fits no other pose", name, own),
+          fmt::format("look whether all photographs of {} are of one pose, or take them again", own),
+          Severity::bad);
+    }
+  }
+}
+
+// What should be known of photographs that were used.
+void remark_photographs(CampaignResult& result) {
+  std::vector<double> rms_px;
+  for (const MeasuredPhotograph& photograph : result.photographs) {
+    if (is_used(photograph.status) && photograph.residuals.markers > 0)
+      rms_px.push_back(photograph.residuals.rms_px);
+  }
+  const double typical_px = rms_px.empty() ? 0 : median(std::move(rms_px));
+  for (std::size_t p = 0; p < result.photographs.size(); ++p) {
+    MeasuredPhotograph& photograph = result.photographs[p];
+    if (!is_used(photograph.status)) continue;
+    const int rejected = photograph.residuals.rejected;
+    if (rejected > 0)
+      add_words(photograph.words, fmt::format("{} marker{} left out", rejected, rejected == 1 ? "" : "s"));
+    if (typical_px > 0 && photograph.residuals.rms_px > kFarAboveMedian * typical_px)
+      add_words(photograph.words, fmt::format("residuals {:.0f} times the campaign's median",
+                                              photograph.residuals.rms_px / typical_px));
+  }
+}
+
+// Poses far weaker than the others.
+void remark_weak_poses(std::vector<MeasuredPose>& poses) {
+  const auto sigma_of = [](const MeasuredPose& pose, bool position) {
+    const Vector6d variance = pose.covariance.diagonal().cwiseMax(0.0);
+    return std::sqrt(position ? variance.head<3>().sum() : variance.tail<3>().sum());
+  };
+  std::vector<double> mm, rad;
+  for (const MeasuredPose& pose : poses) {
+    // A pose that defines a frame has no sigma of its own and says nothing about the others'.
+    if (!pose.pose || !(sigma_of(pose, true) > 0)) continue;
+    mm.push_back(sigma_of(pose, true));
+    rad.push_back(sigma_of(pose, false));
+  }
+  if (mm.empty()) return;
+  const double typical_mm = median(std::move(mm));
+  const double typical_rad = median(std::move(rad));
+  for (MeasuredPose& pose : poses) {
+    if (!pose.pose) continue;
+    const double times = std::max(sigma_of(pose, true) / typical_mm, sigma_of(pose, false) / typical_rad);
+    if (times > kFarAboveMedian)
+      add_words(pose.words, fmt::format("sigma {:.0f} times the campaign's median", times));
+  }
+}
+
+}  // namespace
+
 void judge_photographs(const CampaignObservations& observations, CampaignResult& result) {
+  judge_misplaced(observations, result);
   std::vector<int> known(result.photographs.size(), 0);
   for (const Sighting& sighting : result.adjusted.sightings) {
     if (sighting.marker >= 0 && sighting.status != SightingStatus::not_measured) {
@@ -278,17 +291,18 @@ void judge_photographs(const CampaignObservations& observations, CampaignResult&
       add_words(photograph.words, photograph.residuals.rejected > 0
                                       ? "all its markers contradict the other photographs"
                                       : "no fixed marker connects it with the other photographs");
-    } else if (photograph.residuals.rejected > photograph.residuals.markers) {
+    } else if (!photograph.contradicts_pose && photograph.residuals.rejected > photograph.residuals.markers) {
       photograph.status = PhotoStatus::disagrees;
       add_words(photograph.words, fmt::format("{} of {} markers contradict the other photographs",
                                               photograph.residuals.rejected,
                                               photograph.residuals.rejected + photograph.residuals.markers));
     }
   }
+  remark_photographs(result);
 }
 
-void judge_poses(const Campaign& campaign, const CampaignObservations& observations,
-                 const ExtractOptions& options, CampaignResult& result) {
+void judge_poses(const CampaignObservations& observations, const ExtractOptions& options,
+                 CampaignResult& result) {
   for (std::size_t e = 0; e < result.poses.size(); ++e) {
     MeasuredPose& pose = result.poses[e];
     pose.status = status_of_photographs(observations, result, e, pose.words);
@@ -298,100 +312,16 @@ void judge_poses(const Campaign& campaign, const CampaignObservations& observati
     if (e < result.adjusted.epoch_residuals.size()) pose.rms_px = result.adjusted.epoch_residuals[e].rms_px;
     if (result.adjusted.status != AdjustmentStatus::nothing_connected &&
         result.adjusted.geometry.has_epoch[e]) {
-      pose.intersection_deg = intersection_angle(result, e);
+      pose.intersection_deg = intersection_angle(result, e, evidence);
     }
     if (pose.status == PoseStatus::ok && result.adjusted.status == AdjustmentStatus::nothing_connected) {
       pose.status = PoseStatus::disconnected;
       add_words(pose.words, result.adjusted.reason);
     }
-    judge_pose(campaign, options, evidence, e, result, pose);
+    judge_pose(options, evidence, e, result, pose);
     if (!is_measured(pose.status)) pose.pose.reset();
   }
-}
-
-void judge_campaign(const Campaign& campaign, CampaignResult& result) {
-  const AdjustmentResult& adjusted = result.adjusted;
-  // (marker, epoch): sightings used and rejected.
-  std::map<std::pair<int, int>, std::pair<int, int>> counts;
-  for (const Sighting& sighting : adjusted.sightings) {
-    if (sighting.marker < 0) continue;
-    auto& [used, rejected] =
-        counts[{sighting.marker, result.network.photos[static_cast<std::size_t>(sighting.photo)].epoch}];
-    if (sighting.status == SightingStatus::used) ++used;
-    if (sighting.status == SightingStatus::outlier) ++rejected;
-  }
-  std::map<int, std::vector<std::string>> moved;
-  for (const auto& [key, count] : counts) {
-    if (count.first == 0 && count.second >= 2) {
-      moved[key.first].push_back(result.poses[static_cast<std::size_t>(key.second)].id);
-    }
-  }
-  for (const auto& [marker, poses] : moved) {
-    result.warnings.push_back(fmt::format(
-        "marker {} stands elsewhere in pose {}: it moved, or another marker has its id; left out there",
-        result.network.markers[static_cast<std::size_t>(marker)].id, fmt::join(poses, ", ")));
-  }
-  std::set<int> once;
-  for (const Sighting& sighting : adjusted.sightings) {
-    if (sighting.status == SightingStatus::seen_once) {
-      once.insert(result.network.markers[static_cast<std::size_t>(sighting.marker)].id);
-    }
-  }
-  if (!once.empty()) {
-    result.warnings.push_back(
-        fmt::format("seen in one photograph only and not used: marker {}", fmt::join(once, ", ")));
-  }
-  if (adjusted.sigma0 > kSuspectSigma0) {
-    result.warnings.push_back(fmt::format(
-        "residuals are {:.1f} times what the photographs promise: the camera file is not of this lens "
-        "setting, or "
-        "the markers are not flat and square; sigmas are enlarged by that and may still be too small",
-        adjusted.sigma0));
-    for (MeasuredPose& pose : result.poses) {
-      if (pose.pose) add_words(pose.words, "the campaign's residuals are too large: see the warnings");
-    }
-  }
-  if (adjusted.interior_loosened) {
-    result.warnings.push_back(
-        fmt::format("the camera is not as it was calibrated: its interior orientation moved by {:.1f} sigma "
-                    "and was refined freely",
-                    std::sqrt(adjusted.interior_chi2 / std::max(1, adjusted.interior_dof))));
-  }
-  for (const MeasuredLength& bar : result.bars) {
-    // A single bar that gives the scale agrees with itself.
-    if (!bar.measured || (campaign.scale == ScaleFrom::bars && result.bars.size() < 2)) continue;
-    const double off = bar.length_mm - bar.known.length_mm;
-    const double sigma = std::hypot(bar.sigma_mm, bar.known.sigma_mm);
-    if (std::abs(off) > kScaleDisagreementSigmas * sigma) {
-      result.warnings.push_back(fmt::format(
-          "bar {}-{}: measured {:.4f} mm, stated {:.4f} mm, {:.1f} sigma apart: it disagrees with the scale "
-          "used",
-          bar.known.a.id, bar.known.b.id, bar.length_mm, bar.known.length_mm, std::abs(off) / sigma));
-    }
-  }
-  for (const DatumFrame* frame : {&result.UG, &result.LG}) {
-    for (const std::string& note : frame->notes) {
-      result.warnings.push_back(fmt::format("{}: {}", frame == &result.UG ? "UG" : "LG", note));
-    }
-  }
-}
-
-void judge_swapped_folders(const std::vector<std::optional<Pose>>& targets, CampaignResult& result) {
-  std::vector<MeasuredPose>& poses = result.poses;
-  const auto known = [&](std::size_t i) { return poses[i].pose && targets[i]; };
-  const auto gap = [&](std::size_t measured, std::size_t target) {
-    return pose_gap_mm(*poses[measured].pose, *targets[target]);
-  };
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    for (std::size_t j = i + 1; j < poses.size(); ++j) {
-      if (!known(i) || !known(j)) continue;
-      if (kSwappedFitsBetter * (gap(i, j) + gap(j, i)) >= gap(i, i) + gap(j, j)) continue;
-      result.warnings.push_back(fmt::format(
-          "{} and {} look swapped: each lies where the other was commanded to", poses[i].id, poses[j].id));
-      suspect(poses[i], fmt::format("swapped with {}?", poses[j].id));
-      suspect(poses[j], fmt::format("swapped with {}?", poses[i].id));
-    }
-  }
+  remark_weak_poses(result.poses);
 }
 
 }  // namespace hexcal

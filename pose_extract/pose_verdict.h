@@ -1,30 +1,51 @@
 #pragma once
 
+#include <map>
+#include <string>
+
 #include "pose_extract/extract_poses.h"
+
+// The one home of what makes a photograph, a pose, a campaign good, with its limits. Commands, the live watch
+// and the report only show what is decided here: statuses and words of photographs and poses, findings about
+// the campaign.
 
 namespace hexcal {
 
-/// Two sources of the scale that differ by more disagree.
+/// Two sources of the scale, or a check distance and its measurement, that differ by more disagree: said
+/// aloud.
 inline constexpr double kScaleDisagreementSigmas = 3;
+/// Beyond this many sigmas a contradiction makes the poses that it concerns suspect: `ok` promises as much.
+inline constexpr double kContradictionSigmas = 4;
+/// Residuals over what the photographs promise. Real lenses and prints stay below 2; beyond the first it is
+/// said, beyond the second something is wrong with the whole, and its poses are suspect.
+inline constexpr double kNoisySigma0 = 1.5;
+inline constexpr double kSuspectSigma0 = 3;
+
+/// Appends to words that are parted by semicolons.
+void add_words(std::string& words, const std::string& more);
 
 /// Says of a measured pose, or of a photograph that was used, what contradicts it. One that failed stays as
 /// it is, with the words more.
 void suspect(MeasuredPose& pose, const std::string& words);
 void suspect(MeasuredPhotograph& photograph, const std::string& words);
 
-/// Status and words of each photograph after the adjustment.
+/// Status and words of each photograph after the adjustment; findings for those that show another pose.
 void judge_photographs(const CampaignObservations& observations, CampaignResult& result);
 
 /// Status and words of each pose; takes away poses that must not be trusted.
-void judge_poses(const Campaign& campaign, const CampaignObservations& observations,
-                 const ExtractOptions& options, CampaignResult& result);
+void judge_poses(const CampaignObservations& observations, const ExtractOptions& options,
+                 CampaignResult& result);
 
-/// Warnings about the campaign: moved markers, bars that disagree, a camera that is not as calibrated.
+/// Findings about the campaign: poses that failed, moved markers, bars and check distances that disagree, a
+/// camera that is not as calibrated.
 void judge_campaign(const Campaign& campaign, CampaignResult& result);
 
-/// Names, as suspect, the poses that lie where another was to be and it where they were, as after two
-/// folders' names were swapped. `targets` are the commanded poses in the order of result.poses; none where
-/// unknown.
-void judge_swapped_folders(const std::vector<std::optional<Pose>>& targets, CampaignResult& result);
+/// Findings from the commanded poses by id: misspelt ids; frames that are turned against each other; poses
+/// that lie where another was to be, as after two folders' names were swapped, which become suspect.
+void judge_against_targets(const std::map<std::string, Pose>& commanded, CampaignResult& result);
+
+/// The worst of all findings and statuses: good means that every pose and photograph is ok. In a campaign
+/// without a moving body folders are no poses and do not count.
+[[nodiscard]] Severity overall_verdict(const CampaignResult& result);
 
 }  // namespace hexcal

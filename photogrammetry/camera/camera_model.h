@@ -10,11 +10,11 @@
 namespace hexcal {
 
 /// How the lens bends rays. Normalised coordinates (x, y) = (X/Z, Y/Z), r^2 = x^2 + y^2:
-///   brown     g = 1 + k1 r^2 + k2 r^4 + k3 r^6                       parameters k1 k2 p1 p2 k3 (OpenCV's
-///   order) rational  g = (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6), thin prism
-///                                                                    parameters k1 k2 p1 p2 k3 k4 k5 k6 s1
-///                                                                    s2 s3 s4
-///   radial    g = 1 + a1 r + a2 r^2 + ... + a6 r^6                   parameters a1 .. a6 p1 p2
+///   brown     g = 1 + k1 r^2 + k2 r^4 + k3 r^6; parameters k1 k2 p1 p2 k3
+///   rational  g = (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6), thin prism;
+///             parameters k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4
+///   radial    g = 1 + a1 r + a2 r^2 + ... + a6 r^6; parameters a1 .. a6 p1 p2
+/// The first two in OpenCV's order.
 /// distorted = (x, y) g + decentring (p1, p2; Brown 1966) + thin prism (s1 r^2 + s2 r^4, s3 r^2 + s4 r^4), as
 /// in OpenCV.
 enum class LensModel { brown, rational, radial };

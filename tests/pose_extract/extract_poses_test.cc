@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <map>
 
 #include "kinematics/geometry/input_error.h"
 #include "pose_extract/pose_verdict.h"
@@ -17,6 +18,11 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
+
+MATCHER_P(Says, words, "") {
+  *result_listener << finding_text(arg);
+  return finding_text(arg).find(words) != std::string::npos;
+}
 
 // A campaign on which each test plays one fault; healthy poses must stay within twice their clean error.
 class ExtractPoses : public ::testing::Test {
@@ -83,7 +89,8 @@ TEST_F(ExtractPoses, CleanCampaignGivesEveryPoseAndHomeIsZero) {
   EXPECT_EQ(pose(result, "p01").images, 3);
   EXPECT_EQ(pose(result, "p01").markers, 10);
   EXPECT_GT(pose(result, "p01").intersection_deg, 20);
-  EXPECT_TRUE(result.warnings.empty()) << result.warnings.front();
+  EXPECT_TRUE(result.findings.empty()) << result.findings.front().cause;
+  EXPECT_EQ(overall_verdict(result), Severity::good);
 }
 
 TEST_F(ExtractPoses, NoiseFreeCampaignIsExact) {
@@ -258,7 +265,7 @@ TEST_F(ExtractPoses, MovedFixedMarkerIsNamed) {
   }
   const CampaignResult result = extract();
   expect_others_ok(result, "");
-  EXPECT_THAT(result.warnings, Contains(HasSubstr("marker 2 stands elsewhere in pose p03")));
+  EXPECT_THAT(result.findings, Contains(Says("marker 2 stands elsewhere in pose p03")));
 }
 
 TEST_F(ExtractPoses, MarkerSeenOnceIsNamed) {
@@ -271,7 +278,7 @@ TEST_F(ExtractPoses, MarkerSeenOnceIsNamed) {
     });
   }
   const CampaignResult result = extract();
-  EXPECT_THAT(result.warnings, Contains(HasSubstr("marker 105")));
+  EXPECT_THAT(result.findings, Contains(Says("marker 105")));
 }
 
 TEST_F(ExtractPoses, NearlyOneDirectionIsSaid) {
@@ -298,16 +305,19 @@ TEST_F(ExtractPoses, HomeNotMeasuredLeavesNoDatum) {
   EXPECT_THAT(pose(result, "p01").words, HasSubstr("home"));
 }
 
-TEST_F(ExtractPoses, UnknownHomePoseIsTheUsersError) {
-  made_.campaign.lg->home_pose = "hoem";
-  EXPECT_THROW((void)extract_poses(made_.campaign, made_.observations), InputError);
+TEST_F(ExtractPoses, UnknownHomePoseIsTheUsersErrorAndHasAWayOn) {
+  made_.campaign.lg->home_pose = "start";
+  EXPECT_THAT(
+      [&] { (void)extract_poses(made_.campaign, made_.observations); },
+      ThrowsInputError("found 'start', which is none of the poses: home, p01, p02, p03, p04; photograph the "
+                       "home as 'start', or let another pose be the home: --home POSE"));
 }
 
 TEST_F(ExtractPoses, WrongNominalPointIsLeftOut) {
   made_.campaign.ug->nominal[5].xyz_mm += Eigen::Vector3d(3, 0, 0);
   const CampaignResult result = extract();
   expect_others_ok(result, "");
-  EXPECT_THAT(result.warnings, Contains(HasSubstr("nominal point 1.1")));
+  EXPECT_THAT(result.findings, Contains(Says("nominal point 1.1")));
 }
 
 TEST_F(ExtractPoses, NothingAtAllIsRefusedForEveryPose) {
@@ -322,7 +332,7 @@ TEST_F(ExtractPoses, BarThatDisagreesWithTheMarkersIsNamed) {
   made_.campaign.bars.push_back({{0, -1}, {4, -1}, length + 0.2, 0.005});
   made_.campaign.checks.push_back({{1, -1}, {3, -1}, 10, 0});
   const CampaignResult result = extract();
-  EXPECT_THAT(result.warnings, Contains(HasSubstr("bar 0-4")));
+  EXPECT_THAT(result.findings, Contains(Says("bar 0-4")));
   EXPECT_TRUE(result.checks.at(0).measured);
 }
 
@@ -333,11 +343,11 @@ TEST_F(ExtractPoses, ScaleFromNominalCoordinatesOverridesMisprintedSizes) {
   options.print_scale = 0.01;
   made_ = make_campaign_scene(options);
   const CampaignResult with_sizes = extract_poses(made_.campaign, made_.observations);
-  EXPECT_THAT(with_sizes.warnings, Contains(HasSubstr("disagree with the scale")));
+  EXPECT_THAT(with_sizes.findings, Contains(Says("disagree with the scale")));
   made_.campaign.scale = ScaleFrom::nominal;
   const CampaignResult result = extract();
   EXPECT_NEAR(result.UG.scale, 1.01, 1e-4);
-  EXPECT_THAT(result.warnings, Contains(HasSubstr("printed 1.0")));
+  EXPECT_THAT(result.findings, Contains(Says("printed 1.0")));
 }
 
 TEST_F(ExtractPoses, BarsGiveTheScaleAndSayHowTheMarkersWerePrinted) {
@@ -353,11 +363,11 @@ TEST_F(ExtractPoses, BarsGiveTheScaleAndSayHowTheMarkersWerePrinted) {
   made_.campaign.bars = {{{0, -1}, {4, -1}, distance(0, 4), 0.002},
                          {{5, -1}, {9, -1}, distance(5, 9), 0.002}};
   const CampaignResult agreeing = extract();
-  EXPECT_THAT(agreeing.warnings, Contains(HasSubstr("the markers are printed 1.0")));
-  EXPECT_THAT(agreeing.warnings, Not(Contains(HasSubstr("bar "))));
+  EXPECT_THAT(agreeing.findings, Contains(Says("the markers are printed 1.0")));
+  EXPECT_THAT(agreeing.findings, Not(Contains(Says("bar "))));
   made_.campaign.bars[1].length_mm += 0.05;
-  EXPECT_THAT(extract_poses(made_.campaign, made_.observations).warnings,
-              Contains(HasSubstr("bar 5-9: measured")));
+  EXPECT_THAT(extract_poses(made_.campaign, made_.observations).findings,
+              Contains(Says("bar 5-9: measured")));
 }
 
 TEST_F(ExtractPoses, ResidualsFarBeyondTheirPromiseAreSaidInEveryPose) {
@@ -365,8 +375,10 @@ TEST_F(ExtractPoses, ResidualsFarBeyondTheirPromiseAreSaidInEveryPose) {
     for (MarkerObservation& marker : photograph.seen.markers) marker.covariance_px2 *= 0.01;
   }
   const CampaignResult result = extract();
-  EXPECT_THAT(result.warnings, Contains(HasSubstr("times what the photographs promise")));
-  EXPECT_THAT(pose(result, "p01").words, HasSubstr("residuals are too large"));
+  EXPECT_THAT(result.findings, Contains(Says("times what the photographs promise")));
+  EXPECT_THAT(pose(result, "p01").words, HasSubstr("times what they should be"));
+  EXPECT_EQ(pose(result, "p01").status, PoseStatus::suspect);
+  EXPECT_TRUE(pose(result, "p01").pose);
 }
 
 TEST_F(ExtractPoses, WithoutAMeasuredBarTheScaleIsThatOfTheMarkers) {
@@ -376,8 +388,8 @@ TEST_F(ExtractPoses, WithoutAMeasuredBarTheScaleIsThatOfTheMarkers) {
     std::erase_if(photograph.seen.markers, [](const MarkerObservation& m) { return m.id == 4; });
   const CampaignResult result = extract();
   expect_others_ok(result, "");
-  EXPECT_THAT(result.warnings,
-              Contains("no scale bar was measured: the scale is that of the markers' sizes"));
+  EXPECT_THAT(result.findings,
+              Contains(Says("no scale bar was measured: the scale is that of the markers' sizes")));
   EXPECT_FALSE(result.bars.at(0).measured);
 }
 
@@ -412,14 +424,14 @@ TEST_F(ExtractPoses, APoseInWhichMostMovingMarkersMovedContradicts) {
   EXPECT_FALSE(pose(result, "p02").pose);
 }
 
-TEST_F(ExtractPoses, APhotographMostOfWhoseMarkersContradictIsNamed) {
+TEST_F(ExtractPoses, APhotographOfAnotherPoseWithFewFixedMarkersIsNamedToo) {
   show_moving_markers_of(3, "p02", 1);
   std::erase_if(seen("p02", 1).markers, [](const MarkerObservation& m) { return m.id > 3 && m.id < 100; });
   const CampaignResult result = extract();
   expect_others_ok(result, "");
   const MeasuredPhotograph& photograph = result.photographs[photographs_of("p02")[1]];
-  EXPECT_EQ(photograph.status, PhotoStatus::disagrees);
-  EXPECT_THAT(photograph.words, HasSubstr("markers contradict the other photographs"));
+  EXPECT_EQ(photograph.status, PhotoStatus::suspect);
+  EXPECT_EQ(photograph.shows_pose, "p03");
   EXPECT_THAT(pose(result, "p02").words, HasSubstr(photograph.words));
   EXPECT_EQ(pose(result, "p02").images, 2);
 }
@@ -448,35 +460,150 @@ TEST_F(ExtractPoses, ACameraThatIsNotAsCalibratedIsSaid) {
   made_ = make_campaign_scene(options);
   made_.observations.cameras[0].model.parameters[0] += 20;
   const CampaignResult result = extract_poses(made_.campaign, made_.observations);
-  EXPECT_THAT(result.warnings, Contains(HasSubstr("the camera is not as it was calibrated")));
+  EXPECT_THAT(result.findings, Contains(Says("the camera is not as it was calibrated")));
   expect_others_ok(result, "");
 }
 
+// Poses p0, p1, ... as measured, judged against the targets of the same names.
+CampaignResult judged_poses(const std::vector<std::optional<Pose>>& measured,
+                            const std::vector<Pose>& targets) {
+  CampaignResult result;
+  std::map<std::string, Pose> commanded;
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    MeasuredPose pose;
+    pose.id = fmt::format("p{}", i);
+    pose.pose = measured[i];
+    if (pose.pose) pose.status = PoseStatus::ok;
+    result.poses.push_back(pose);
+    commanded[pose.id] = targets[i];
+  }
+  judge_against_targets(commanded, result);
+  return result;
+}
+
 TEST(SwappedFolders, AreNamedOnlyWhereEachLiesAtTheOthersTarget) {
-  const std::vector<std::optional<Pose>> targets{Pose{}, Pose{{20, 0, 0}, {0, 0, 0}},
-                                                 Pose{{0, 30, 0}, {0, 0.1, 0}}};
-  const auto judged = [&](const std::vector<std::optional<Pose>>& measured) {
-    CampaignResult result;
-    for (std::size_t i = 0; i < measured.size(); ++i) {
-      MeasuredPose pose;
-      pose.id = fmt::format("p{}", i);
-      pose.pose = measured[i];
-      result.poses.push_back(pose);
-    }
-    judge_swapped_folders(targets, result);
-    return result;
-  };
-  const CampaignResult swapped = judged({Pose{{1, 1, 0}, {0, 0, 0}}, targets[2], targets[1]});
-  EXPECT_THAT(swapped.warnings,
-              ElementsAre("p1 and p2 look swapped: each lies where the other was commanded to"));
+  const std::vector<Pose> targets{Pose{}, Pose{{20, 0, 0}, {0, 0, 0}}, Pose{{0, 30, 0}, {0, 0.1, 0}}};
+  const CampaignResult swapped = judged_poses({Pose{{1, 1, 0}, {0, 0, 0}}, targets[2], targets[1]}, targets);
+  EXPECT_THAT(
+      swapped.findings,
+      ElementsAre(Says("p1 and p2 look swapped: each lies where the other was commanded to: exchange the two "
+                       "folders p1 and p2")));
+  EXPECT_EQ(swapped.findings[0].severity, Severity::bad);
   EXPECT_EQ(swapped.poses[0].words, "");
   EXPECT_EQ(swapped.poses[1].words, "swapped with p2?");
   EXPECT_EQ(swapped.poses[2].words, "swapped with p1?");
   EXPECT_EQ(swapped.poses[0].status, PoseStatus::ok);
   EXPECT_EQ(swapped.poses[1].status, PoseStatus::suspect);
   EXPECT_EQ(swapped.poses[2].status, PoseStatus::suspect);
-  EXPECT_TRUE(judged(targets).warnings.empty());
-  EXPECT_TRUE(judged({Pose{}, targets[2], std::nullopt}).warnings.empty());
+  EXPECT_TRUE(judged_poses({targets[0], targets[1], targets[2]}, targets).findings.empty());
+  EXPECT_TRUE(judged_poses({Pose{}, targets[2], std::nullopt}, targets).findings.empty());
+}
+
+std::vector<Pose> some_targets() {
+  return {Pose{}, Pose{{20, 3, -5}, {0.02, 0.05, 0}}, Pose{{-4, 18, 2}, {-0.06, 0.01, 0.03}},
+          Pose{{7, -9, 11}, {0.03, -0.04, -0.05}}, Pose{{-12, -6, -8}, {0.05, 0.02, 0.04}}};
+}
+
+TEST(TurnedFrames, AreToldFromAMachineThatIsOff) {
+  const std::vector<Pose> targets = some_targets();
+  const Eigen::Quaterniond quarter(Eigen::AngleAxisd(90 * kRadPerDeg, Eigen::Vector3d::UnitZ()));
+  std::vector<std::optional<Pose>> turned, off, mirrored;
+  for (const Pose& target : targets) {
+    const Rigid3 motion = home_from_lg(target);
+    turned.emplace_back(pose_from_home_from_lg(
+        {quarter * motion.rotation * quarter.inverse(), quarter * motion.translation}));
+    Pose wrong = target;
+    wrong.position_mm += Eigen::Vector3d(1.5, -2, 1) + 0.05 * target.position_mm;
+    wrong.rpy_rad += Eigen::Vector3d(0.01, -0.01, 0.02);
+    off.emplace_back(wrong);
+    Pose other_sign = target;
+    other_sign.position_mm.x() *= -1;
+    mirrored.emplace_back(other_sign);
+  }
+  EXPECT_THAT(judged_poses(turned, targets).findings,
+              ElementsAre(Says("turned by 90 deg about (0.00, 0.00, 1.00): the axes of frame UG")));
+  EXPECT_THAT(judged_poses(mirrored, targets).findings, ElementsAre(Says("an axis has the other sign")));
+  EXPECT_TRUE(judged_poses(off, targets).findings.empty());
+}
+
+TEST(TargetNames, AMisspeltOneIsNamedWithThePoseThatIsMeant) {
+  const std::vector<Pose> targets = some_targets();
+  CampaignResult result;
+  for (const char* id : {"home", "p001", "p002"}) {
+    MeasuredPose pose;
+    pose.id = id;
+    result.poses.push_back(pose);
+  }
+  judge_against_targets(
+      {{"home", targets[0]}, {"P001", targets[1]}, {"p002", targets[2]}, {"p077", targets[3]}}, result);
+  EXPECT_THAT(result.findings,
+              ElementsAre(Says("target P001 has no photographs, and pose p001 has no target: did you "
+                               "mean p001?")));
+}
+
+TEST(SamePoseTwice, TheOneFartherFromItsTargetIsSuspect) {
+  const std::vector<Pose> targets = some_targets();
+  const CampaignResult result =
+      judged_poses({targets[0], targets[1], targets[1], targets[3], targets[4]}, targets);
+  EXPECT_EQ(result.poses[1].status, PoseStatus::ok);
+  EXPECT_EQ(result.poses[2].status, PoseStatus::suspect);
+  EXPECT_THAT(result.findings, ElementsAre(Says("p1 and p2 are the same measured pose")));
+}
+
+TEST_F(ExtractPoses, APhotographOfAnotherPoseIsNamedWithThePoseThatItBelongsTo) {
+  show_moving_markers_of(3, "p02", 1);
+  const CampaignResult result = extract();
+  const MeasuredPhotograph& photograph = result.photographs[photographs_of("p02")[1]];
+  EXPECT_EQ(photograph.status, PhotoStatus::suspect) << photograph.words;
+  EXPECT_EQ(photograph.shows_pose, "p03");
+  EXPECT_THAT(result.findings, Contains(Says("shows pose p03, not p02: move it to the folder of p03")));
+  expect_others_ok(result, "");
+  EXPECT_EQ(overall_verdict(result), Severity::bad);
+}
+
+TEST_F(ExtractPoses, APhotographThatFitsNoPoseMakesItsPoseSuspect) {
+  const Rigid3 elsewhere = made_.scene.fixed_from_moving[2] * Rigid3::from_translation({6, -7, 5});
+  made_.scene.fixed_from_moving.push_back(elsewhere);
+  show_moving_markers_of(made_.scene.fixed_from_moving.size() - 1, "p02", 1);
+  const CampaignResult result = extract();
+  expect_others_ok(result, "p02");
+  EXPECT_EQ(pose(result, "p02").status, PoseStatus::suspect) << pose(result, "p02").words;
+  EXPECT_TRUE(pose(result, "p02").pose);
+  EXPECT_THAT(result.findings, Contains(Says("contradicts the others of pose p02, and fits no other pose")));
+}
+
+TEST_F(ExtractPoses, ACheckDistanceFarOffMakesThePosesSuspect) {
+  const double length =
+      (made_.scene.body_from_marker[0].translation - made_.scene.body_from_marker[4].translation).norm();
+  made_.campaign.checks.push_back({{0, -1}, {4, -1}, length, 0.05});
+  CampaignResult result = extract();
+  expect_others_ok(result, "");
+  EXPECT_EQ(overall_verdict(result), Severity::good);
+  made_.campaign.checks[0].length_mm += 0.55;
+  result = extract();
+  EXPECT_THAT(result.findings, Contains(Says("check 0-4: measured")));
+  EXPECT_EQ(overall_verdict(result), Severity::bad);
+  EXPECT_EQ(pose(result, "p01").status, PoseStatus::suspect);
+  EXPECT_THAT(pose(result, "p01").words, HasSubstr("check 0-4 is -0.55 mm off (11.0 sigma)"));
+  EXPECT_TRUE(pose(result, "p01").pose);
+}
+
+TEST_F(ExtractPoses, TheAngleBetweenStationsIsSaidAlsoWhereNoMarkerIsSeenTwice) {
+  seen("p03", 2).markers.clear();
+  const double both = pose(extract(), "p03").intersection_deg;
+  EXPECT_GT(both, 20);
+  std::erase_if(seen("p03", 0).markers, [](const MarkerObservation& m) { return m.id >= 105; });
+  std::erase_if(seen("p03", 1).markers, [](const MarkerObservation& m) { return m.id >= 100 && m.id < 105; });
+  const CampaignResult result = extract_poses(made_.campaign, made_.observations);
+  EXPECT_NEAR(pose(result, "p03").intersection_deg, both, 3);
+  EXPECT_THAT(pose(result, "p03").words, Not(HasSubstr("nearly one direction")));
+}
+
+TEST_F(ExtractPoses, AHomeWrittenOtherwiseIsTakenAndSaid) {
+  made_.campaign.lg->home_pose = "Home";
+  const CampaignResult result = extract();
+  expect_others_ok(result, "");
+  EXPECT_THAT(result.findings, ElementsAre(Says("'Home' is none of the poses; 'home' was taken")));
 }
 
 TEST_F(ExtractPoses, OnlyFixedMarkersIsAPlainPhotogrammetryProject) {

@@ -13,7 +13,6 @@ inline NetworkPart sample_network() {
   network.sigma0 = 1.1;
   network.rms_px = 0.01;
   network.redundancy = 120;
-  network.warnings = {"marker 103 moved"};
   network.datums = {{"UG", "40 points fit"}, {"LG", "defined by the home pose"}};
   network.lengths = {{"check 0 to 5", 182.41, 0.004, 182.405}, {"bar 1 to 2", {}, 0, 100}};
   network.scene = sample_scene();
@@ -37,6 +36,7 @@ inline NetworkPart sample_network() {
           {corners[static_cast<std::size_t>(c)], {0.01 * (c - 1), 0.006 * m}, used});
   }
   photograph.rejected = 1;
+  photograph.remarks = "1 marker left out";
   network.photographs.push_back(photograph);
   PhotographPart dark;
   dark.pose_id = "pose_3";
@@ -47,6 +47,7 @@ inline NetworkPart sample_network() {
   PhotographPart clean = photograph;
   clean.name = "pose_1/DSC_3.jpg";
   clean.rejected = 0;
+  clean.remarks.clear();
   clean.outlines.pop_back();
   clean.residuals.resize(8);
   network.photographs.push_back(clean);
@@ -62,8 +63,10 @@ inline const CampaignReport& sample_report() {
     campaign.measured[2].sigma.reset();
     campaign.measured[2].status = "no <markers> & no light";
     *campaign.measured[5].sigma *= 5;
+    campaign.measured[5].remarks = "sigma 5 times the campaign's median";
     CampaignReport out;
     out.name = "<Tiger> & Co";
+    out.verdict = {Light::warning, "Nearly all went well.", {"Marker 103 moved."}, {"Look at it."}};
     out.poses = campaign.measured;
     out.targets = campaign.targets;
     CompensationPart part;

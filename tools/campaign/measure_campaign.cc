@@ -32,12 +32,22 @@ void refuse_foreign_camera(const OpenCampaign& open, const CampaignObservations&
                                    observations.photographs.front().seen.name, photographs.front().words));
 }
 
-void judge_against_files(const OpenCampaign& open, CampaignResult& result) {
+void judge_against_files(const MeasureRequest& request, const OpenCampaign& open, CampaignResult& result) {
   for (std::size_t c = 0; c < open.cameras.size(); ++c) {
     if (open.cameras[c].covariance.size() > 0) continue;
-    result.warnings.push_back(
+    result.findings.emplace_back(
         fmt::format("{} states no covariance: the sigmas of the poses leave the camera's own error out",
-                    open.campaign.cameras[c].file.filename().string()));
+                    open.campaign.cameras[c].file.filename().string()),
+        "calibrate the camera with hexcal camera");
+  }
+  if (request.home) {
+    // Targets are relative to the machine's home, which this pose is not.
+    result.findings.emplace_back(
+        fmt::format(
+            "the poses are relative to {}, not to the machine's home: they are not compared with the targets",
+            *request.home),
+        "photograph the home before the machine is compensated by these poses", Severity::bad);
+    return;
   }
   if (!open.campaign.targets) return;
   std::map<std::string, Pose> commanded;
@@ -47,15 +57,11 @@ void judge_against_files(const OpenCampaign& open, CampaignResult& result) {
     }
   } catch (const InputError& error) {
     // The measurement needs no targets.
-    result.warnings.push_back(fmt::format("not compared with the targets: {}", error.what()));
+    result.findings.emplace_back(fmt::format("not compared with the targets: {}", error.what()),
+                                 "mend the file of targets");
     return;
   }
-  std::vector<std::optional<Pose>> targets;
-  for (const MeasuredPose& pose : result.poses) {
-    const auto found = commanded.find(pose.id);
-    targets.push_back(found == commanded.end() ? std::nullopt : std::optional<Pose>(found->second));
-  }
-  judge_swapped_folders(targets, result);
+  judge_against_targets(commanded, result);
 }
 
 }  // namespace
@@ -64,7 +70,7 @@ CampaignResult measure_observations(const MeasureRequest& request, const OpenCam
                                     const CampaignObservations& observations) {
   CampaignResult result = extract_poses(open.campaign, observations, extract_options(request));
   refuse_foreign_camera(open, observations, result);
-  judge_against_files(open, result);
+  judge_against_files(request, open, result);
   return result;
 }
 

@@ -22,11 +22,11 @@ fs::path record_file(const OpenCampaign& open) { return open.results / "cache" /
 
 // Everything but the content of files: flags and listing.
 std::string circumstances(const MeasureRequest& request, const OpenCampaign& open) {
-  std::string text =
-      fmt::format("{} {} {} {} {} {} {} {} {}\n", request.campaign.string(),
-                  request.poses_dir.value_or("").string(), open.poses_csv.string(),
-                  request.observations.value_or("").string(), request.group_by_time_s.value_or(-1),
-                  request.interior_fixed, request.overlays, request.colmap, request.map_poses);
+  std::string text = fmt::format("{} {} {} {} {} {} {} {} {} {}\n", request.campaign.string(),
+                                 request.poses_dir.value_or("").string(), open.poses_csv.string(),
+                                 request.observations.value_or("").string(), request.home.value_or(""),
+                                 request.group_by_time_s.value_or(-1), request.interior_fixed,
+                                 request.overlays, request.colmap, request.map_poses);
   if (request.observations) return sha256_hex(text);
   const ImageListing& listing = open.listing;
   for (const std::string& pose : listing.poses) text += fmt::format("{}\n", pose);

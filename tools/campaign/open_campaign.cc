@@ -16,6 +16,13 @@ namespace fs = std::filesystem;
 OpenCampaign open_campaign(const MeasureRequest& request) {
   OpenCampaign open;
   open.campaign = read_campaign(request.campaign);
+  if (request.home) {
+    if (!open.campaign.lg || open.campaign.lg->from != FrameRule::From::home) {
+      throw InputError(fmt::format("--home {}: found, but frames.LG of {} is not from home", *request.home,
+                                   open.campaign.file.string()));
+    }
+    open.campaign.lg->home_pose = *request.home;
+  }
   const Campaign& campaign = open.campaign;
   open.results = campaign.folder / "results";
   open.poses_csv = request.output.value_or(open.results / "poses.csv");

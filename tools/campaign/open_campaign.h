@@ -16,6 +16,7 @@ struct MeasureRequest {
   std::optional<std::filesystem::path> poses_dir;     ///< instead of the campaign's images
   std::optional<std::filesystem::path> output;        ///< of poses.csv; default results/poses.csv
   std::optional<std::filesystem::path> observations;  ///< use these and no photographs
+  std::optional<std::string> home;                    ///< this pose defines LG, not campaign.yaml's
   std::optional<double> group_by_time_s;              ///< flat folder: a longer pause begins a new pose
   bool interior_fixed = false;                        ///< keep the interior orientation of the camera file
   int map_poses = 0;  ///< poses that the map of the markers is made of; 0: all in one adjustment

@@ -54,6 +54,9 @@ class HeadInspector {
       return foreign(i, fmt::format("{} x {} px, the camera file is for {} x {}", info.width_px,
                                     info.height_px, camera.model.width_px, camera.model.height_px));
     }
+    if (camera.setting.focal_length_mm && !info.focal_length_mm)
+      heads_.findings.push_back(
+          {i, false, false, "its EXIF states no focal length: the zoom setting is not checked"});
     for (const SettingDifference& difference : compare_setting(camera.setting, info))
       heads_.findings.push_back({i, difference.fatal, difference.fatal, difference.words});
   }

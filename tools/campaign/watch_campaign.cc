@@ -90,6 +90,15 @@ class Watcher {
     }
   }
 
+  static bool has_home(const OpenCampaign& open, const std::vector<std::string>& poses) {
+    try {
+      (void)find_home(open.campaign, poses);
+      return true;
+    } catch (const InputError&) {
+      return false;  // not yet
+    }
+  }
+
   void say_once(const std::string& words) {
     if (words == said_) return;
     said_ = words;
@@ -211,9 +220,7 @@ class Watcher {
       inputs += fmt::format("{} {} {}\n", image.pose, image.name, file->second.photograph.seen.sha256);
     }
     const auto& lg = open.campaign.lg;
-    const bool home_missing = lg && lg->from == FrameRule::From::home &&
-                              std::find(observations.poses.begin(), observations.poses.end(),
-                                        lg->home_pose) == observations.poses.end();
+    const bool home_missing = lg && lg->from == FrameRule::From::home && !has_home(open, observations.poses);
     if (home_missing && !observations.poses.empty())
       say_once(fmt::format("poses wait for the home pose '{}'", lg->home_pose));
     if (observations.poses.empty() || home_missing || inputs == measured_inputs_) return false;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tools/campaign/open_campaign.h"
+#include "tools/hexcal/acceptance_limits.h"
 
 // The commands of the main job as functions, each with its flags; `hexcal run` is these three in a row.
 
@@ -16,6 +17,7 @@ struct MeasureFlags {
   bool json = false;
   bool dry_run = false;
   bool no_cache = false;
+  AcceptanceLimits limits;
 };
 [[nodiscard]] int run_measure(const MeasureFlags& flags);
 
@@ -37,6 +39,7 @@ struct CompensateFlags {
 struct ReportFlags {
   std::filesystem::path campaign, out, figures, before;
   std::string method = "auto";
+  bool require_good = false;
   bool json = false;
 };
 [[nodiscard]] int run_report(const ReportFlags& flags);

@@ -12,6 +12,7 @@
 #include "camera_calib/measure_camera.h"
 #include "kinematics/geometry/input_error.h"
 #include "photogrammetry/photograph/photograph_format.h"
+#include "tools/hexcal/acceptance_limits.h"
 #include "tools/hexcal/camera_tables.h"
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/terminal.h"
@@ -40,6 +41,7 @@ struct CameraFlags {
   std::string ruler;
   std::string lens;
   std::string board;
+  AcceptanceLimits limits;
   bool json = false;
 };
 
@@ -199,7 +201,12 @@ int run_camera(const CameraFlags& flags) {
   if (!done) throw InputError(calibration.reason);
   const bool some_failed = std::any_of(report.photographs.begin(), report.photographs.end(),
                                        [](const PhotographRow& row) { return row.status != "ok"; });
-  return some_failed || report.quality.verdict == CameraVerdict::retake ? kSomeFailed : kDone;
+  const std::vector<std::string> passed = passed_limits(
+      flags.limits,
+      {std::nullopt, std::nullopt, report.quality.rms_px, report.quality.verdict == CameraVerdict::good});
+  for (const std::string& line : passed) fmt::print(stderr, "limit: {}\n", line);
+  const bool retake = report.quality.verdict == CameraVerdict::retake;
+  return some_failed || retake || !passed.empty() ? kSomeFailed : kDone;
 }
 
 }  // namespace
@@ -229,6 +236,7 @@ void add_camera_command(CLI::App& app, Action& action) {
       ->add_option("--board", flags->board,
                    "freedom of the printed sheet instead of the one chosen by evidence")
       ->check(CLI::IsMember({"ideal", "warped", "points"}));
+  add_limit_flags(*command, flags->limits, {nullptr, nullptr, true, true});
   command->add_flag("--json", flags->json, "print JSON");
   command->callback([flags, &action] { action = [flags] { return run_camera(*flags); }; });
 }

@@ -1,12 +1,14 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/geometry/nearest_name.h"
 #include "tools/campaign/photograph_heads.h"
 #include "tools/hexcal/commands.h"
 #include "tools/hexcal/terminal.h"
@@ -24,12 +26,19 @@ class Findings {
   explicit Findings(bool as_json) : as_json_(as_json) {}
 
   void good(const std::string& line) { add("ok", "ok  ", Colour::good, line); }
-  void warn(const std::string& line) { add("warning", "warn", Colour::warning, line); }
+  void warn(const std::string& line) {
+    add("warning", "warn", Colour::warning, line);
+    ++warned_;
+  }
   void bad(const std::string& line) {
     add("problem", "BAD ", Colour::bad, line);
     ++bad_;
   }
   [[nodiscard]] int count() const { return bad_; }
+  [[nodiscard]] std::string summary() const {
+    if (bad_ > 0) return fmt::format("{} problems", bad_);
+    return warned_ == 0 ? "nothing wrong found" : fmt::format("no problem, {} warnings", warned_);
+  }
   [[nodiscard]] const nlohmann::ordered_json& json() const { return json_; }
 
   // Runs a reader whose failure is one finding among others.
@@ -51,6 +60,7 @@ class Findings {
   bool as_json_;
   nlohmann::ordered_json json_ = nlohmann::ordered_json::array();
   int bad_ = 0;
+  int warned_ = 0;
 };
 
 void check_photographs(const OpenCampaign& open, const HeadInspection& heads, Findings& findings) {
@@ -77,9 +87,38 @@ void check_poses(const OpenCampaign& open, Findings& findings) {
   for (const SkippedFile& file : open.listing.skipped)
     findings.warn(fmt::format("{}: {}", file.name, file.reason));
   const auto& lg = open.campaign.lg;
-  if (lg && lg->from == FrameRule::From::home && photographs[lg->home_pose] == 0) {
-    findings.bad(fmt::format("home pose '{}' has no photographs; poses: {}", lg->home_pose,
-                             fmt::join(open.listing.poses, ", ")));
+  if (!lg || lg->from != FrameRule::From::home) return;
+  try {
+    const std::string home = find_home(open.campaign, open.listing.poses);
+    if (home != lg->home_pose) {
+      findings.warn(fmt::format("home pose '{}' is none of the poses; '{}' is taken", lg->home_pose, home));
+    } else if (photographs[home] == 0) {
+      findings.bad(fmt::format("home pose '{}' has no photographs; poses: {}", home,
+                               fmt::join(open.listing.poses, ", ")));
+    }
+  } catch (const InputError& error) {
+    findings.bad(error.what());
+  }
+}
+
+// Nominal coordinates of markers that the body has, at least three points of it.
+void check_frame(const OpenCampaign& open, const char* name, const std::optional<FrameRule>& rule,
+                 const MarkerSizes& markers, Findings& findings) {
+  if (!rule || rule->from != FrameRule::From::nominal) return;
+  std::set<MarkerPoint> known;
+  std::set<int> strangers;
+  for (const NominalPoint& point : rule->nominal)
+    markers.count(point.point.id) != 0 ? void(known.insert(point.point))
+                                       : void(strangers.insert(point.point.id));
+  const std::string file = rule->nominal_file ? rule->nominal_file->string() : open.campaign.file.string();
+  if (!strangers.empty()) {
+    findings.warn(
+        fmt::format("{}: markers {} are none of frame {}'s body", file, fmt::join(strangers, ", "), name));
+  }
+  if (known.size() < 3) {
+    findings.bad(
+        fmt::format("{}: frame {} cannot be fitted: {} points of its body's markers, wanted 3 at least", file,
+                    name, known.size()));
   }
 }
 
@@ -87,8 +126,22 @@ void check_targets(const OpenCampaign& open, const std::filesystem::path& path, 
   findings.expect(path.string(), [&] {
     const std::vector<PoseRecord> targets = read_pose_table(path);
     std::set<std::string> known(open.listing.poses.begin(), open.listing.poses.end());
+    std::vector<std::string> without_target;
+    for (const std::string& pose : open.listing.poses) {
+      if (std::ranges::find(targets, pose, &PoseRecord::id) == targets.end()) without_target.push_back(pose);
+    }
+    std::set<std::string> meant;
     for (const PoseRecord& target : targets) {
-      if (known.count(target.id) == 0) findings.warn(fmt::format("target {}: has no photographs", target.id));
+      if (known.count(target.id) != 0) continue;
+      const auto nearest = nearest_name(target.id, without_target);
+      if (nearest) meant.insert(*nearest);
+      findings.warn(fmt::format("target {}: has no photographs{}", target.id,
+                                nearest ? fmt::format("; did you mean {}?", *nearest) : ""));
+    }
+    const auto& lg = open.campaign.lg;
+    for (const std::string& pose : without_target) {
+      if (meant.count(pose) == 0 && !(lg && lg->home_pose == pose))
+        findings.warn(fmt::format("pose {}: has no target", pose));
     }
     return fmt::format("{} targets", targets.size());
   });
@@ -119,6 +172,8 @@ int check(const MeasureRequest& request, bool as_json) {
     findings.expect(campaign.legs->string(),
                     [&] { return fmt::format("{} rows", read_leg_table(*campaign.legs).size()); });
   }
+  check_frame(open, "UG", campaign.ug, campaign.fixed, findings);
+  check_frame(open, "LG", campaign.lg, campaign.moving, findings);
   check_poses(open, findings);
   const HeadInspection heads = inspect_heads(open);
   check_photographs(open, heads, findings);
@@ -130,7 +185,7 @@ int check(const MeasureRequest& request, bool as_json) {
     fmt::print("{}\n", json_text(json, 1));
   } else {
     fmt::print("{} photographs in {} poses; {}\n", open.listing.images.size(), open.listing.poses.size(),
-               findings.count() == 0 ? "nothing wrong found" : fmt::format("{} problems", findings.count()));
+               findings.summary());
     if (findings.count() == 0) suggest_next("hexcal run " + shell_word(request.campaign.string()));
   }
   refuse_foreign_camera(open, heads);

@@ -10,6 +10,7 @@
 
 #include "calibration/statistics.h"
 #include "kinematics/geometry/input_error.h"
+#include "tools/hexcal/acceptance_limits.h"
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/error_tables.h"
 #include "tools/hexcal/terminal.h"
@@ -26,6 +27,7 @@ struct EvaluateFlags {
   fs::path targets;
   fs::path before;
   std::vector<fs::path> after;
+  AcceptanceLimits limits;
   bool json = false;
 };
 
@@ -154,6 +156,12 @@ int run_evaluate(const EvaluateFlags& flags) {
     }
     out["tables"].push_back(entry);
   }
+  const ErrorStatistics& last = tables.back().own;
+  for (const std::string& line : passed_limits(
+           flags.limits, {last.position_max_mm, last.orientation_max_rad * kDegPerRad, std::nullopt, true})) {
+    fmt::print(stderr, "limit: {} ({})\n", line, tables.back().label);
+    some_failed = true;
+  }
   if (flags.json) {
     fmt::print("{}\n", json_text(out, 2));
     return some_failed ? kSomeFailed : kDone;
@@ -182,6 +190,9 @@ void add_evaluate_command(CLI::App& app, Action& action) {
   command->add_option("--before", flags->before, "poses reached before compensation (poses.csv)")->required();
   command->add_option("--after", flags->after,
                       "poses reached after compensation; may be given several times");
+  add_limit_flags(*command, flags->limits,
+                  {"largest position error of the last table",
+                   "largest angle between target and pose of the last table", false, false});
   command->add_flag("--json", flags->json, "machine-readable output");
   command->footer(
       "The paper's table stands over each table's own valid poses; the true errors stand over the poses "

@@ -16,6 +16,8 @@
 #include "tools/hexcal/terminal.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/json_text.h"
+#include "tools/io/pose_table.h"
+#include "tools/io/quality_file.h"
 
 namespace hexcal {
 namespace {
@@ -102,6 +104,20 @@ MeasurementAnswer measure_anew(const MeasureRequest& request, OpenCampaign open)
   return answer;
 }
 
+// From the files, which an unchanged measurement left as they were.
+Reached reached(const std::filesystem::path& poses_csv, const std::filesystem::path& quality_json) {
+  const Quality quality = read_quality(quality_json);
+  Reached out;
+  out.rms_px = quality.rms_px;
+  out.good = quality.verdict == Severity::good;
+  for (const PoseRecord& record : read_pose_table(poses_csv)) {
+    if (!record.sigma) continue;
+    out.mm = std::max(out.mm.value_or(0), record.sigma->head<3>().maxCoeff());
+    out.deg = std::max(out.deg.value_or(0), record.sigma->tail<3>().maxCoeff() * kDegPerRad);
+  }
+  return out;
+}
+
 }  // namespace
 
 int run_measure(const MeasureFlags& flags) {
@@ -116,6 +132,7 @@ int run_measure(const MeasureFlags& flags) {
     return code;
   }
   const std::filesystem::path quality = open.results / "quality.json";
+  const std::filesystem::path poses_csv = open.poses_csv;
   const std::string next = next_command(request.campaign, open.campaign);
   const CampaignLock lock(open.results);
   std::optional<MeasurementAnswer> answer = unchanged_measurement(request, open);
@@ -125,9 +142,11 @@ int run_measure(const MeasureFlags& flags) {
   } else {
     fmt::print("{}", answer->text);
     fmt::print("{}", written_line(answer->written));
-    suggest_next(next);
   }
-  return answer->exit_code;
+  const std::vector<std::string> passed = passed_limits(flags.limits, reached(poses_csv, quality));
+  for (const std::string& line : passed) fmt::print(stderr, "limit: {}\n", line);
+  if (!flags.json) suggest_next(next);
+  return passed.empty() ? answer->exit_code : kSomeFailed;
 }
 
 void add_measure_command(CLI::App& app, Action& action) {
@@ -166,6 +185,8 @@ void add_measure_command(CLI::App& app, Action& action) {
   command
       ->add_option("--threads", request.threads, "Photographs worked on at a time (default: all processors)")
       ->check(CLI::NonNegativeNumber);
+  command->add_option("--home", request.home, "This pose is the home, not the one that campaign.yaml names");
+  add_limit_flags(*command, flags->limits);
   command->add_flag("--overlays", request.overlays,
                     "Write one JPEG per photograph with markers and residuals x200");
   command->add_flag("--colmap", request.colmap, "Write a COLMAP text model for its viewer");

@@ -31,8 +31,7 @@ PreparedPage prepare_page(const ReportFlags& flags) {
     const ComparisonReport both{read_campaign_report(flags.before, flags.method), std::move(report)};
     return {render_page(comparison_page(both)), comparison_verdict(both), comparison_charts(both), {}};
   }
-  PreparedPage page{
-      render_page(campaign_page(report)), campaign_verdict(report), campaign_charts(report), {}};
+  PreparedPage page{render_page(campaign_page(report)), report.verdict, campaign_charts(report), {}};
   if (report.network) page.scene = std::move(report.network->scene);
   return page;
 }
@@ -77,6 +76,8 @@ int run_report(const ReportFlags& flags) {
   std::vector<std::string> figures;
   if (!flags.figures.empty()) figures = write_figures(page, flags.figures);
   const Verdict& verdict = page.verdict;
+  const bool short_of_good = flags.require_good && verdict.light != Light::good;
+  const int code = verdict.light == Light::bad || short_of_good ? kSomeFailed : kDone;
   if (flags.json) {
     const nlohmann::ordered_json json{{"verdict", light_name(verdict.light)},
                                       {"headline", verdict.headline},
@@ -85,15 +86,16 @@ int run_report(const ReportFlags& flags) {
                                       {"page", out.string()},
                                       {"figures", figures}};
     fmt::print("{}\n", json_text(json, 1));
-    return kDone;
+    return code;
   }
   fmt::print("{}: {}\n", coloured(light_words(verdict.light), colour_of(verdict.light)), verdict.headline);
   for (const std::string& finding : verdict.findings) fmt::print("- {}\n", finding);
+  for (const std::string& step : verdict.next_steps) fmt::print("next: {}\n", step);
   fmt::print("wrote {}\n", out.string());
   if (!figures.empty())
     fmt::print("wrote {} figures, SVG and PDF, to {}\n", figures.size(), flags.figures.string());
   suggest_next("xdg-open " + shell_word(out.string()));
-  return kDone;
+  return code;
 }
 
 void add_report_command(CLI::App& app, Action& action) {
@@ -107,6 +109,11 @@ void add_report_command(CLI::App& app, Action& action) {
                       "the page (default: results/report.html of the campaign, or results/comparison.html)");
   command->add_option("--figures", flags->figures, "folder for every figure as SVG and PDF");
   command->add_option("--method", flags->method, "as for hexcal compensate")->capture_default_str();
+  command
+      ->add_option_function<std::string>(
+          "--require", [flags](const std::string&) { flags->require_good = true; },
+          "good: exit with 1 unless the verdict is good")
+      ->check(CLI::IsMember({"good"}));
   command->add_flag("--json", flags->json, "print the verdict as JSON");
   command->footer(
       "The page needs no network: verdict, table of poses, the paper's figures and tables for this campaign, "

@@ -14,9 +14,6 @@
 namespace hexcal {
 namespace {
 
-constexpr double kGoodSigmaMm = 0.01;
-constexpr double kPoorSigmaMm = 0.05;
-
 std::atomic<bool> stop_requested{false};
 
 void request_stop(int) { stop_requested = true; }
@@ -56,14 +53,13 @@ class WatchLines : public WatchObserver {
     const double sigma = std::sqrt(pose.covariance.diagonal().head<3>().cwiseMax(0.0).maxCoeff());
     const double angle =
         std::sqrt(pose.covariance.diagonal().tail<3>().cwiseMax(0.0).maxCoeff()) * kDegPerRad;
-    const bool good = pose.status == PoseStatus::ok && sigma <= kGoodSigmaMm && pose.words.empty();
     const Vector6d v = pose.pose->vector();
     fmt::print(
         "{} {}: {:.4f} {:.4f} {:.4f} mm  {:.4f} {:.4f} {:.4f} deg  sigma {:.2f} um {:.2f} mdeg  {} "
         "photos{}\n",
-        good                                                     ? coloured("GREEN ", Colour::good)
-        : sigma <= kPoorSigmaMm && pose.status == PoseStatus::ok ? coloured("YELLOW", Colour::warning)
-                                                                 : coloured("RED   ", Colour::bad),
+        pose.status != PoseStatus::ok ? coloured("RED   ", Colour::bad)
+        : pose.words.empty()          ? coloured("GREEN ", Colour::good)
+                                      : coloured("YELLOW", Colour::warning),
         pose.id, v[0], v[1], v[2], v[3] * kDegPerRad, v[4] * kDegPerRad, v[5] * kDegPerRad, sigma * 1e3,
         angle * 1e3, pose.images, pose.words.empty() ? "" : "  " + pose.words);
   }
@@ -89,9 +85,9 @@ void add_watch_command(CLI::App& app, Action& action) {
       "Example:\n  hexcal watch campaign/ --expect 3\n"
       "  GREEN  p001: 1.2034 0.5521 -3.0418 mm  0.4121 -1.2003 0.0312 deg  sigma 0.84 um 0.61 mdeg  3 "
       "photos\n"
-      "A file counts when its size rests and it decodes. GREEN: sigma at most 10 um and nothing to remark; "
-      "YELLOW: at "
-      "most 50 um; RED: no pose, or a poor one. Ctrl-C ends; the next run resumes.");
+      "A file counts when its size rests and it decodes. GREEN: good; YELLOW: measured, with a remark; RED: "
+      "no pose, or "
+      "one that something contradicts. Ctrl-C ends; the next run resumes.");
   const auto flags = std::make_shared<WatchRequest>();
   command->add_option("campaign", flags->measure.campaign, "Campaign folder or its campaign.yaml")
       ->required();

@@ -2,13 +2,15 @@
 
 #include <fmt/format.h>
 
+#include "tools/io/pose_table.h"
+
 namespace hexcal {
 
 std::string decimal(double value, int digits) { return fmt::format("{:.{}f}", value, digits); }
 
-nlohmann::ordered_json json_mm_deg(const Vector6d& mm_rad) {
+nlohmann::ordered_json json_mm_deg(const Vector6d& mm_and_rad) {
   auto list = nlohmann::ordered_json::array();
-  for (Eigen::Index i = 0; i < 6; ++i) list.push_back(mm_rad[i] * (i < 3 ? 1 : kDegPerRad));
+  for (const double value : mm_deg(mm_and_rad)) list.push_back(value);
   return list;
 }
 
@@ -33,8 +35,7 @@ std::vector<std::string> paper_columns(const std::string& title) {
 
 std::vector<std::string> paper_row(const std::string& label, const ErrorStatistics& errors) {
   std::vector<std::string> cells{label, std::to_string(errors.poses)};
-  for (Eigen::Index i = 0; i < 6; ++i)
-    cells.push_back(decimal(errors.range[i] * (i < 3 ? 1 : kDegPerRad), i < 3 ? 3 : 4));
+  for (Eigen::Index i = 0; i < 6; ++i) cells.push_back(decimal(mm_deg(errors.range)[i], i < 3 ? 3 : 4));
   cells.push_back(decimal(errors.position_magnitude_mm, 3));
   cells.push_back(decimal(errors.orientation_magnitude_rad * kDegPerRad, 4));
   return cells;

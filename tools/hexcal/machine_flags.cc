@@ -8,6 +8,7 @@
 #include "kinematics/geometry/input_error.h"
 #include "tools/io/hexapod_file.h"
 #include "tools/io/model_file.h"
+#include "tools/io/pose_table.h"
 
 namespace hexcal {
 
@@ -52,12 +53,8 @@ Vector6d six_numbers(const std::string& text, const std::string& flag) {
   return numbers;
 }
 
-Pose pose_from_mm_deg(const Vector6d& v) { return {v.head<3>(), v.tail<3>() * kRadPerDeg}; }
+Pose pose_from_mm_deg(const Vector6d& v) { return Pose::from_vector(mm_rad(v)); }
 
-Vector6d mm_deg_from_pose(const Pose& pose) {
-  Vector6d v = pose.vector();
-  v.tail<3>() *= kDegPerRad;
-  return v;
-}
+Vector6d mm_deg_from_pose(const Pose& pose) { return mm_deg(pose.vector()); }
 
 }  // namespace hexcal

@@ -2,12 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "pose_extract/pose_verdict.h"
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/io/measured_poses.h"
 
 namespace hexcal {
 namespace {
+
+constexpr int kShownRemarks = 10;
 
 std::string length_line(const char* kind, const MeasuredLength& length) {
   const auto name = [](const MarkerPoint& point) {
@@ -33,14 +38,12 @@ std::string measurement_text(const CampaignMeasurement& measurement) {
   for (const MeasuredPose& pose : result.poses) {
     std::vector<std::string> cells{pose.id};
     const bool ok = pose.status == PoseStatus::ok;
-    for (int i = 0; i < 6; ++i) {
-      const double unit = i < 3 ? 1.0 : kRadPerDeg;
-      cells.push_back(pose.pose ? fmt::format("{:.4f}", pose.pose->vector()[i] / unit) : "");
-    }
+    for (int i = 0; i < 6; ++i)
+      cells.push_back(pose.pose ? fmt::format("{:.4f}", mm_deg(pose.pose->vector())[i]) : "");
     if (pose.pose) {
-      const Vector6d sigma = pose_sigmas(pose);
+      const Vector6d sigma = mm_deg(pose_sigmas(pose));
       cells.push_back(fmt::format("{:.2f}", sigma.head<3>().maxCoeff() * 1e3));
-      cells.push_back(fmt::format("{:.2f}", sigma.tail<3>().maxCoeff() * kDegPerRad * 1e3));
+      cells.push_back(fmt::format("{:.2f}", sigma.tail<3>().maxCoeff() * 1e3));
     } else {
       cells.insert(cells.end(), {"", ""});
     }
@@ -58,6 +61,7 @@ std::string measurement_text(const CampaignMeasurement& measurement) {
   if (!result.poses.empty()) out += table.text();
   const AdjustmentResult& adjusted = result.adjusted;
   int used = 0;
+  int remarked = 0;
   std::size_t worst = 0;
   for (std::size_t p = 0; p < result.photographs.size(); ++p) {
     const MeasuredPhotograph& photograph = result.photographs[p];
@@ -66,15 +70,25 @@ std::string measurement_text(const CampaignMeasurement& measurement) {
     if (photograph.status != PhotoStatus::ok) {
       out += fmt::format("photograph {}: {}: {}\n", observations.photographs[p].seen.name,
                          photo_status_name(photograph.status), photograph.words);
-    } else if (!photograph.words.empty()) {
+    } else if (!photograph.words.empty() && ++remarked <= kShownRemarks) {
       out += fmt::format("photograph {}: {}\n", observations.photographs[p].seen.name, photograph.words);
     }
   }
+  if (remarked > kShownRemarks)
+    out += fmt::format("and {} more photographs with remarks, see quality.json\n", remarked - kShownRemarks);
   for (const SkippedFile& file : open.listing.skipped)
     out += fmt::format("not used: {}: {}\n", file.name, file.reason);
   for (const MeasuredLength& bar : result.bars) out += length_line("bar", bar);
   for (const MeasuredLength& check : result.checks) out += length_line("check", check);
-  for (const std::string& warning : result.warnings) out += fmt::format("warning: {}\n", warning);
+  for (const Finding& finding : result.findings) {
+    const bool problem = finding.severity == Severity::bad;
+    out += fmt::format("{}: {}\n",
+                       coloured(problem                                 ? "problem"
+                                : finding.severity == Severity::warning ? "warning"
+                                                                        : "note",
+                                problem ? Colour::bad : Colour::plain),
+                       finding_text(finding));
+  }
   out += fmt::format("{} of {} poses{}, {} of {} photographs",
                      result.poses.size() - static_cast<std::size_t>(bad), result.poses.size(),
                      suspects > 0 ? fmt::format(" ({} more are suspect)", suspects) : "", used,
@@ -90,14 +104,13 @@ std::string measurement_text(const CampaignMeasurement& measurement) {
 }
 
 int measurement_exit_code(const CampaignResult& result) {
-  for (const MeasuredPose& pose : result.poses) {
-    // In a plain photogrammetry project folders are no poses.
-    if (pose.status != PoseStatus::ok && result.has_moving) return kSomeFailed;
-  }
-  for (const MeasuredPhotograph& photograph : result.photographs) {
-    if (photograph.status != PhotoStatus::ok) return kSomeFailed;
-  }
-  return result.adjusted.status == AdjustmentStatus::ok ? kDone : kSomeFailed;
+  const bool all_ok = std::ranges::all_of(result.photographs, [](const MeasuredPhotograph& photograph) {
+    return photograph.status == PhotoStatus::ok;
+  });
+  const bool poses_ok = !result.has_moving || std::ranges::all_of(result.poses, [](const MeasuredPose& pose) {
+    return pose.status == PoseStatus::ok;
+  });
+  return all_ok && poses_ok && overall_verdict(result) != Severity::bad ? kDone : kSomeFailed;
 }
 
 }  // namespace hexcal

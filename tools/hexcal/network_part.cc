@@ -70,7 +70,6 @@ void add_quality(const fs::path& path, NetworkPart& network) {
   network.sigma0 = quality.sigma0;
   network.rms_px = quality.rms_px;
   network.redundancy = quality.redundancy;
-  network.warnings = std::move(quality.warnings);
   add_lengths(quality.bars, "bar", network);
   add_lengths(quality.checks, "check", network);
   network.datums = {{"UG", datum_words(quality.UG)}, {"LG", datum_words(quality.LG)}};

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "kinematics/geometry/input_error.h"
+#include "tools/campaign/campaign_verdict.h"
 #include "tools/hexcal/network_part.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/calibration_record.h"
@@ -13,6 +14,7 @@
 #include "tools/io/hexapod_file.h"
 #include "tools/io/observation_table.h"
 #include "tools/io/version.h"
+#include "tools/report/markup.h"
 
 namespace hexcal {
 namespace {
@@ -49,8 +51,9 @@ void add_compensation(const Campaign& campaign, const std::string& method, Campa
   files.targets = campaign.targets;
   files.legs = campaign.legs;
   if (fs::exists(results / "poses_covariance.csv")) files.covariance = results / "poses_covariance.csv";
-  inputs.push_back(*campaign.hexapod);
-  if (files.legs) inputs.push_back(*files.legs);
+  for (const std::optional<fs::path>& file : {campaign.hexapod, files.legs}) {
+    if (file && fs::exists(*file)) inputs.push_back(*file);
+  }
   try {
     CompensationPart part;
     part.nominal = read_hexapod_file(*campaign.hexapod);
@@ -67,7 +70,7 @@ void add_compensation(const Campaign& campaign, const std::string& method, Campa
     report.compensation = std::move(part);
   } catch (const InputError& error) {
     // The measurement is worth a report even where nothing can be identified from it.
-    report.no_compensation = fmt::format("No compensation: {}.", error.what());
+    report.no_compensation = fmt::format("No compensation: {}", error.what());
   }
   if (fs::exists(results / "actuators.csv")) {
     inputs.push_back(results / "actuators.csv");
@@ -102,6 +105,29 @@ void add_network(const Campaign& campaign, CampaignReport& report) {
   add_thumbnails(campaign.images, *report.network);
 }
 
+// What was decided about the campaign, as the page shows it.
+Verdict shown_verdict(const Campaign& campaign, const CampaignReport& report) {
+  const fs::path results = campaign.folder / "results";
+  CampaignEvidence evidence;
+  evidence.poses = report.poses;
+  if (report.network) {
+    evidence.photographs = read_photo_table(results / "photos.csv");
+    evidence.quality = read_quality(results / "quality.json");
+  }
+  if (report.compensation) evidence.calibration = &report.compensation->calibration;
+  evidence.no_compensation = report.no_compensation;
+  evidence.commands = report.commands;
+  const CampaignVerdict judged = judge_results(evidence);
+  Verdict verdict;
+  verdict.light = judged.severity == Severity::good      ? Light::good
+                  : judged.severity == Severity::warning ? Light::warning
+                                                         : Light::bad;
+  verdict.headline = judged.headline;
+  for (const Finding& finding : judged.findings) verdict.findings.push_back(sentence(finding.cause));
+  for (const std::string& step : judged.next_steps) verdict.next_steps.push_back(sentence(step));
+  return verdict;
+}
+
 }  // namespace
 
 fs::path campaign_folder(const fs::path& campaign) {
@@ -114,7 +140,7 @@ CampaignReport read_campaign_report(const fs::path& path, const std::string& met
   CampaignReport report;
   report.name = folder_name(campaign.folder);
   std::vector<fs::path> inputs{campaign.file};
-  if (campaign.targets) {
+  if (campaign.targets && fs::exists(*campaign.targets)) {
     inputs.push_back(*campaign.targets);
     report.targets = read_pose_table(*campaign.targets);
   }
@@ -131,6 +157,7 @@ CampaignReport read_campaign_report(const fs::path& path, const std::string& met
     add_network(campaign, report);
     report.provenance.emplace_back("poses.csv was made by", maker_of(results / "poses.csv"));
   }
+  report.verdict = shown_verdict(campaign, report);
   for (const fs::path& input : inputs)
     report.provenance.emplace_back(input.filename().string(), "sha256 " + sha256_hex(read_file(input)));
   return report;

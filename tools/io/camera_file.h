@@ -9,12 +9,13 @@ namespace hexcal {
 
 /// Reads a camera.yaml:
 ///
-///     model: brown                    # brown, rational, radial (camera_model.h)
+///     model: brown                     # brown, rational, radial (camera_model.h)
 ///     image_size_px: [6016, 4000]
-///     parameters: {f_px: 9011.1, affinity: 0, cx_px: 3007.5, cy_px: 1999.5, k1: ..., ...}   # all of the
-///     model's valid_radius: 0.46              # optional: tan of the largest ray angle the model was fitted
-///     for covariance: [[...], ...]        # optional, n x n in the order of the parameters setting: {make:
-///     ..., ...}       # optional quality: {...}                  # optional
+///     parameters: {f_px: 9011.1, affinity: 0, cx_px: 3007.5, cy_px: 1999.5, k1: ..., ...}  # all of them
+///     valid_radius: 0.46               # optional: tan of the largest ray angle the model was fitted for
+///     covariance: [[...], ...]         # optional, n x n in the order of the parameters
+///     setting: {make: ..., ...}        # optional
+///     quality: {...}                   # optional
 ///
 /// Refuses (InputError) unknown or missing keys, a covariance that is not symmetric or not positive, a model
 /// that folds inside the frame, a principal point outside it.

@@ -17,6 +17,17 @@ inline constexpr std::array kPoseColumns{"x_mm", "y_mm", "z_mm", "roll_deg", "pi
 /// What one of column i of a pose is in mm or rad: files carry degrees, memory carries radians.
 [[nodiscard]] constexpr double pose_column_unit(std::size_t i) { return i < 3 ? 1.0 : kRadPerDeg; }
 
+/// The six numbers of a pose, an error or their sigmas as files and tables carry them (mm and deg) from
+/// memory's mm and rad, and back.
+[[nodiscard]] inline Vector6d mm_deg(Vector6d mm_rad) {
+  mm_rad.tail<3>() *= kDegPerRad;
+  return mm_rad;
+}
+[[nodiscard]] inline Vector6d mm_rad(Vector6d mm_deg) {
+  mm_deg.tail<3>() *= kRadPerDeg;
+  return mm_deg;
+}
+
 /// One row of targets.csv, poses.csv or predicted_poses.csv. Absent columns are absent here.
 struct PoseRecord {
   std::string id;

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "kinematics/geometry/input_error.h"
+#include "pose_extract/pose_verdict.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/json_text.h"
 #include "tools/io/measured_poses.h"
@@ -36,6 +37,13 @@ std::vector<MeasuredLength> parse_lengths(const Json& rows) {
     lengths.push_back(length);
   }
   return lengths;
+}
+
+Severity severity_of(const std::string& name) {
+  for (const Severity severity : {Severity::good, Severity::warning}) {
+    if (name == severity_name(severity)) return severity;
+  }
+  return Severity::bad;
 }
 
 DatumFrame parse_datum(const Json& json) {
@@ -73,10 +81,8 @@ std::string quality_text(const CampaignObservations& observations, const Campaig
   for (const MeasuredPose& pose : result.poses) {
     Json row{{"pose", pose.id}, {"status", pose_status_name(pose.status)}, {"words", pose.words}};
     if (pose.pose) {
-      Vector6d v = pose.pose->vector();
-      Vector6d s = pose_sigmas(pose);
-      v.tail<3>() *= kDegPerRad;
-      s.tail<3>() *= kDegPerRad;
+      const Vector6d v = mm_deg(pose.pose->vector());
+      const Vector6d s = mm_deg(pose_sigmas(pose));
       row["xyz_mm"] = {v[0], v[1], v[2]};
       row["rpy_deg"] = {v[3], v[4], v[5]};
       row["sigma_xyz_mm"] = {s[0], s[1], s[2]};
@@ -145,7 +151,12 @@ std::string quality_text(const CampaignObservations& observations, const Campaig
   json["skipped"] = Json::array();
   for (const SkippedFile& file : listing.skipped)
     json["skipped"].push_back({{"file", file.name}, {"reason", file.reason}});
-  json["warnings"] = result.warnings;
+  json["verdict"] = severity_name(overall_verdict(result));
+  json["findings"] = Json::array();
+  for (const Finding& finding : result.findings)
+    json["findings"].push_back({{"severity", severity_name(finding.severity)},
+                                {"cause", finding.cause},
+                                {"instruction", finding.instruction}});
   return json_text(json, 1) + "\n";
 }
 
@@ -153,10 +164,14 @@ Quality read_quality(const std::filesystem::path& path) {
   try {
     const auto json = Json::parse(read_file(path));
     Quality quality;
+    quality.verdict = severity_of(json.at("verdict").get<std::string>());
     quality.sigma0 = json.at("sigma0").get<double>();
     quality.rms_px = json.at("rms_px").get<double>();
     quality.redundancy = json.at("redundancy").get<double>();
-    quality.warnings = json.at("warnings").get<std::vector<std::string>>();
+    for (const Json& row : json.at("findings"))
+      quality.findings.emplace_back(row.at("cause").get<std::string>(),
+                                    row.at("instruction").get<std::string>(),
+                                    severity_of(row.at("severity").get<std::string>()));
     quality.UG = parse_datum(json.at("UG"));
     quality.LG = parse_datum(json.at("LG"));
     quality.bars = parse_lengths(json.at("bars"));

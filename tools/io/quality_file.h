@@ -17,11 +17,12 @@ namespace hexcal {
 
 /// What a report takes from it.
 struct Quality {
+  Severity verdict = Severity::good;
   double sigma0 = 0;
   double rms_px = 0;
   double redundancy = 0;
-  std::vector<std::string> warnings;  ///< of the campaign as a whole
-  DatumFrame UG, LG;                  ///< ok, reason, scale, notes and residuals only
+  std::vector<Finding> findings;  ///< about the campaign as a whole
+  DatumFrame UG, LG;              ///< ok, reason, scale, notes and residuals only
   std::vector<MeasuredLength> bars, checks;
   std::map<std::string, std::string> photograph_words;  ///< by photograph
 };

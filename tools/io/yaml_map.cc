@@ -9,6 +9,7 @@
 #include <unordered_map>
 
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/geometry/nearest_name.h"
 #include "kinematics/geometry/pose.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/scalar_text.h"
@@ -66,21 +67,6 @@ std::string shown(const YAML::Node& node) {
   if (node.IsSequence()) return fmt::format("a list of {}", node.size());
   if (node.IsMap()) return "a mapping";
   return "nothing";
-}
-
-std::size_t edit_distance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t up = row[j];
-      row[j] = std::min({up + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0 : 1)});
-      diagonal = up;
-    }
-  }
-  return row[b.size()];
 }
 
 }  // namespace

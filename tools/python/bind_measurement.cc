@@ -31,7 +31,7 @@ Measurement measure(const std::filesystem::path& campaign,
   if (cache && !observations) lock.emplace(open.results);
   const CampaignResult result = measure_campaign(request, std::move(open)).result;
   Measurement out;
-  out.warnings = result.warnings;
+  for (const Finding& finding : result.findings) out.warnings.push_back(finding_text(finding));
   out.poses.setConstant(static_cast<Eigen::Index>(result.poses.size()), 6, std::nan(""));
   for (std::size_t i = 0; i < result.poses.size(); ++i) {
     const MeasuredPose& pose = result.poses[i];
@@ -65,7 +65,7 @@ void bind_measurement(py::module_& module) {
           "covariances", [](const Measurement& m) { return stack_of(m.covariances); },
           "(N, 6, 6), mm and deg.")
       .def_property_readonly("sigmas", &sigmas_of, "(N, 6), mm and deg.")
-      .def_readonly("warnings", &Measurement::warnings, "Of the campaign as a whole.");
+      .def_readonly("warnings", &Measurement::warnings, "Findings about the campaign as a whole.");
   module.def("measure", &measure, py::arg("campaign"), py::arg("observations") = std::nullopt, py::kw_only(),
              py::arg("threads") = 0, py::arg("cache") = true, py::arg("interior_fixed") = false,
              py::call_guard<py::gil_scoped_release>(),

@@ -73,7 +73,7 @@ HtmlPage campaign_page(const CampaignReport& report) {
   std::size_t measured = 0;
   for (const PoseRecord& record : report.poses) measured += record.pose ? 1 : 0;
   page.subtitle = fmt::format("{} of {} poses measured", measured, report.poses.size());
-  page.verdict = html_verdict(campaign_verdict(report));
+  page.verdict = html_verdict(report.verdict);
   if (!report.poses.empty()) page.sections.push_back({"poses", "Poses", poses_section(report)});
   if (!paper_data(report).pose_ids.empty()) {
     page.sections.push_back({"methods", "Errors and methods", methods_section(report)});

@@ -62,7 +62,6 @@ struct NetworkPart {
   double sigma0 = 0;
   double rms_px = 0;
   double redundancy = 0;                                    ///< observations beyond those needed
-  std::vector<std::string> warnings;                        ///< of the campaign as a whole
   std::vector<std::pair<std::string, std::string>> datums;  ///< frame and how it was found
   std::vector<LengthPart> lengths;
   std::vector<PhotographPart> photographs;
@@ -78,6 +77,7 @@ struct CameraPart {
 /// sentence of what would make them.
 struct CampaignReport {
   std::string name;
+  Verdict verdict;                  ///< decided elsewhere, shown first
   std::vector<PoseRecord> poses;    ///< results/poses.csv
   std::vector<PoseRecord> targets;  ///< targets.csv
   std::optional<CompensationPart> compensation;
@@ -89,19 +89,17 @@ struct CampaignReport {
   std::vector<std::pair<std::string, std::string>> provenance;  ///< term and value
 };
 
-/// Traffic light of one measured pose, and why in words (empty when good). Judged against the campaign's own
-/// median sigma: one weak pose shows, a campaign of larger markers is not all red.
-struct PoseJudgement {
+/// Traffic light of one measured pose, and the words of its row (empty when good).
+struct PoseLight {
   Light light = Light::none;
   std::string words;
 };
-[[nodiscard]] std::vector<PoseJudgement> judge_poses(const std::vector<PoseRecord>& poses);
+[[nodiscard]] PoseLight pose_light(const PoseRecord& record);
 
 /// The paper's data from a campaign: targets against measured poses, cross-validated errors of each method
 /// over the poses that it keeps in the workspace.
 [[nodiscard]] PaperData paper_data(const CampaignReport& report);
 
-[[nodiscard]] Verdict campaign_verdict(const CampaignReport& report);
 [[nodiscard]] HtmlPage campaign_page(const CampaignReport& report);
 /// Every figure of the page, for a paper.
 [[nodiscard]] std::vector<Chart> campaign_charts(const CampaignReport& report);

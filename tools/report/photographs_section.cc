@@ -55,15 +55,8 @@ double residual_stretch(const NetworkPart& network) {
 }
 
 // Why a person should look at a photograph; empty for one like the others.
-std::string look_words(const PhotographPart& photograph, double typical_px) {
-  if (photograph.status != "ok") return status_text(photograph.status);
-  std::string words = photograph.remarks;
-  const auto add = [&words](const std::string& more) { words += (words.empty() ? "" : "; ") + more; };
-  if (photograph.rejected > 0)
-    add(fmt::format("{} marker{} rejected", photograph.rejected, photograph.rejected == 1 ? "" : "s"));
-  if (typical_px > 0 && photograph.rms_px > 3 * typical_px)
-    add("residuals more than 3 times the campaign's median");
-  return words;
+std::string look_words(const PhotographPart& photograph) {
+  return photograph.status != "ok" ? status_text(photograph.status) : photograph.remarks;
 }
 
 Light photograph_light(const PhotographPart& photograph, const std::string& words) {
@@ -120,9 +113,8 @@ HtmlTable photograph_table(const NetworkPart& network) {
   table.columns = {{"photograph", "", false, ""},    {"pose", "", false, ""},
                    {"markers", "", true, "used"},    {"rejected", "", true, "seen, but against the rest"},
                    {"residual", "px rms", true, ""}, {"verdict", "", false, ""}};
-  const double typical = typical_rms_px(network);
   for (const PhotographPart& photograph : network.photographs) {
-    const std::string words = look_words(photograph, typical);
+    const std::string words = look_words(photograph);
     HtmlCell verdict = text_cell(words.empty() ? "good" : words, photograph_light(photograph, words));
     verdict.sort_key = static_cast<double>(verdict.light);
     const bool used = is_used(photograph);
@@ -137,12 +129,11 @@ HtmlTable photograph_table(const NetworkPart& network) {
 
 Html photographs_section(const NetworkPart& network) {
   const double stretch = residual_stretch(network);
-  const double typical = typical_rms_px(network);
   Html suspects, others;
   std::size_t suspect_count = 0;
   for (const PhotographPart& photograph : network.photographs) {
     if (!(photograph.size_px.x() > 0)) continue;
-    const std::string words = look_words(photograph, typical);
+    const std::string words = look_words(photograph);
     (words.empty() ? others : suspects) += photograph_figure(photograph, stretch, words);
     suspect_count += words.empty() ? 0 : 1;
   }

@@ -21,15 +21,21 @@ int decimals_for(double sigma, int otherwise) {
 
 HtmlCell parameter_cell(const PoseRecord& record, Eigen::Index i) {
   if (!record.pose) return {};
-  const double unit = i < 3 ? 1 : kDegPerRad;
-  const double sigma = record.sigma ? (*record.sigma)[i] * unit : 0;
+  const double sigma = record.sigma ? mm_deg(*record.sigma)[i] : 0;
   const int decimals = decimals_for(sigma, 4);
-  HtmlCell cell = number_cell(record.pose->vector()[i] * unit, decimals);
+  HtmlCell cell = number_cell(mm_deg(record.pose->vector())[i], decimals);
   if (sigma > 0) cell.second = "\xC2\xB1" + number_text(sigma, std::pow(10.0, -decimals));
   return cell;
 }
 
 }  // namespace
+
+PoseLight pose_light(const PoseRecord& record) {
+  if (!record.pose || is_suspect(record.status)) return {Light::bad, status_text(record.status)};
+  if (record.status != "ok") return {Light::warning, status_text(record.status)};
+  if (record.sigma && record.sigma->isZero(0)) return {Light::none, "defines the home"};
+  return {record.remarks.empty() ? Light::good : Light::warning, record.remarks};
+}
 
 Html poses_section(const CampaignReport& report) {
   std::map<std::string, Pose> targets;
@@ -48,15 +54,13 @@ Html poses_section(const CampaignReport& report) {
   table.columns.push_back({"photos", "", true, "photographs used"});
   table.columns.push_back({"markers", "", true, ""});
   table.columns.push_back({"residual", "px rms", true, ""});
-  const std::vector<PoseJudgement> judgements = judge_poses(report.poses);
-  for (std::size_t row = 0; row < report.poses.size(); ++row) {
-    const PoseRecord& record = report.poses[row];
+  for (const PoseRecord& record : report.poses) {
     std::vector<HtmlCell> cells(2);
     cells[0].text = record.id;
-    cells[1].text = judgements[row].words.empty() ? "good" : judgements[row].words;
-    cells[1].light = judgements[row].light;
-    cells[1].hint = record.remarks;
-    cells[1].sort_key = static_cast<double>(judgements[row].light);
+    const PoseLight verdict = pose_light(record);
+    cells[1].text = verdict.words.empty() ? "good" : verdict.words;
+    cells[1].light = verdict.light;
+    cells[1].sort_key = static_cast<double>(verdict.light);
     for (Eigen::Index i = 0; i < 6; ++i) cells.push_back(parameter_cell(record, i));
     if (!targets.empty()) {
       const auto target = targets.find(record.id);

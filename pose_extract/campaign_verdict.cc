@@ -1,0 +1,153 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "pose_extract/pose_verdict.h"
+
+namespace hexcal {
+namespace {
+
+void suspect_all(CampaignResult& result, const std::string& words) {
+  for (MeasuredPose& pose : result.poses) {
+    if (pose.pose) suspect(pose, words);
+  }
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  constexpr std::size_t kShown = 6;
+  if (names.size() <= kShown) return fmt::format("{}", fmt::join(names, ", "));
+  return fmt::format("{} and {} more", fmt::join(names.begin(), names.begin() + kShown, ", "),
+                     names.size() - kShown);
+}
+
+void judge_failed_poses(CampaignResult& result) {
+  if (!result.has_moving) return;
+  std::vector<std::string> failed;
+  for (const MeasuredPose& pose : result.poses) {
+    if (!is_measured(pose.status)) failed.push_back(pose.id);
+  }
+  if (failed.empty()) return;
+  const bool most = 2 * failed.size() > result.poses.size();
+  result.findings.emplace_back(
+      fmt::format("{} of {} poses could not be measured", failed.size(), result.poses.size()),
+      fmt::format("read why in their rows and take the photographs of {} again", listed(failed)),
+      most ? Severity::bad : Severity::warning);
+}
+
+void judge_markers(CampaignResult& result) {
+  const AdjustmentResult& adjusted = result.adjusted;
+  // (marker, epoch): sightings used and rejected.
+  std::map<std::pair<int, int>, std::pair<int, int>> counts;
+  std::set<int> once;
+  for (const Sighting& sighting : adjusted.sightings) {
+    if (sighting.marker < 0) continue;
+    const auto photo = static_cast<std::size_t>(sighting.photo);
+    if (sighting.status == SightingStatus::seen_once)
+      once.insert(result.network.markers[static_cast<std::size_t>(sighting.marker)].id);
+    // A photograph of another pose says nothing about the markers.
+    if (result.photographs[photo].contradicts_pose) continue;
+    auto& [used, rejected] = counts[{sighting.marker, result.network.photos[photo].epoch}];
+    if (sighting.status == SightingStatus::used) ++used;
+    if (sighting.status == SightingStatus::outlier) ++rejected;
+  }
+  std::map<int, std::vector<std::string>> moved;
+  for (const auto& [key, count] : counts) {
+    if (count.first == 0 && count.second >= 2)
+      moved[key.first].push_back(result.poses[static_cast<std::size_t>(key.second)].id);
+  }
+  for (const auto& [marker, poses] : moved) {
+    const int id = result.network.markers[static_cast<std::size_t>(marker)].id;
+    result.findings.emplace_back(
+        fmt::format(
+            "marker {} stands elsewhere in pose {}: it moved, or another marker has its id; left out there",
+            id, fmt::join(poses, ", ")),
+        fmt::format("look whether marker {} still sticks where it did", id));
+  }
+  if (!once.empty()) {
+    result.findings.emplace_back(
+        fmt::format("seen in one photograph only and not used: marker {}", fmt::join(once, ", ")), "",
+        Severity::good);
+  }
+}
+
+void judge_residuals(CampaignResult& result) {
+  const double sigma0 = result.adjusted.sigma0;
+  if (sigma0 > kSuspectSigma0) {
+    result.findings.emplace_back(
+        fmt::format(
+            "residuals are {:.1f} times what the photographs promise: the camera file is not of this lens "
+            "setting, or the markers are not flat and square; sigmas are enlarged by that and may still be "
+            "too small",
+            sigma0),
+        "calibrate the camera at the lens setting of these photographs", Severity::bad);
+    suspect_all(result, fmt::format("the campaign's residuals are {:.1f} times what they should be", sigma0));
+  } else if (sigma0 > kNoisySigma0) {
+    result.findings.emplace_back(fmt::format(
+        "residuals are {:.1f} times what the corners' own sigmas promise: the camera file does not fit these "
+        "photographs, or markers are not flat; the sigmas shown include it",
+        sigma0));
+  }
+  if (result.adjusted.interior_loosened) {
+    result.findings.emplace_back(
+        fmt::format("the camera is not as it was calibrated: its interior orientation moved by {:.1f} sigma "
+                    "and was refined freely",
+                    std::sqrt(result.adjusted.interior_chi2 / std::max(1, result.adjusted.interior_dof))),
+        "calibrate the camera again, at the zoom and focus of these photographs");
+  }
+}
+
+void judge_length(const char* kind, const MeasuredLength& length, CampaignResult& result) {
+  if (!length.measured) return;
+  const double off = length.length_mm - length.known.length_mm;
+  const double sigmas = std::abs(off) / std::hypot(length.sigma_mm, length.known.sigma_mm);
+  if (!(sigmas > kScaleDisagreementSigmas)) return;
+  const std::string name = fmt::format("{} {}-{}", kind, length.known.a.id, length.known.b.id);
+  const bool contradicts = sigmas > kContradictionSigmas;
+  result.findings.emplace_back(
+      fmt::format(
+          "{}: measured {:.4f} mm, stated {:.4f} mm, {:.1f} sigma apart: it disagrees with the scale used",
+          name, length.length_mm, length.known.length_mm, sigmas),
+      fmt::format("measure the distance from marker {} to {} again; if it stands, the markers' sizes in "
+                  "campaign.yaml are wrong or one of the two moved",
+                  length.known.a.id, length.known.b.id),
+      contradicts ? Severity::bad : Severity::warning);
+  if (contradicts) suspect_all(result, fmt::format("{} is {:+.3g} mm off ({:.1f} sigma)", name, off, sigmas));
+}
+
+}  // namespace
+
+void judge_campaign(const Campaign& campaign, CampaignResult& result) {
+  judge_failed_poses(result);
+  judge_markers(result);
+  judge_residuals(result);
+  // A single bar that gives the scale agrees with itself.
+  if (campaign.scale != ScaleFrom::bars || result.bars.size() > 1) {
+    for (const MeasuredLength& bar : result.bars) judge_length("bar", bar, result);
+  }
+  for (const MeasuredLength& check : result.checks) judge_length("check", check, result);
+  for (const DatumFrame* frame : {&result.UG, &result.LG}) {
+    for (const std::string& note : frame->notes)
+      result.findings.emplace_back(fmt::format("{}: {}", frame == &result.UG ? "UG" : "LG", note));
+  }
+}
+
+Severity overall_verdict(const CampaignResult& result) {
+  Severity worst = Severity::good;
+  const auto meet = [&worst](Severity severity) { worst = std::max(worst, severity); };
+  for (const Finding& finding : result.findings) meet(finding.severity);
+  for (const MeasuredPose& pose : result.poses) {
+    if (!result.has_moving || pose.status == PoseStatus::ok) continue;
+    meet(pose.status == PoseStatus::suspect ? Severity::bad : Severity::warning);
+  }
+  for (const MeasuredPhotograph& photograph : result.photographs) {
+    if (photograph.status != PhotoStatus::ok) meet(Severity::warning);
+  }
+  if (result.adjusted.status != AdjustmentStatus::ok) meet(Severity::bad);
+  return worst;
+}
+
+}  // namespace hexcal
