@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "camera_calib/initial_camera.h"
+#include "kinematics/geometry/chi_squared.h"
 
 namespace hexcal {
 namespace {
@@ -13,23 +14,6 @@ namespace {
 constexpr double kMedian2 = 1.386;  // medians of chi^2 with 2 and 8 degrees of freedom
 constexpr double kMedian8 = 7.344;
 constexpr double kLeastNoisePx = 0.01;  // what no measurement of a corner is called an outlier for
-
-// Quantile of chi^2 with 2 k degrees of freedom at 1 - p: P(chi^2 > x) = exp(-x/2) sum_{i<k} (x/2)^i / i!.
-double chi2_limit(int degrees, double p) {
-  double low = 0;
-  double high = 200;
-  for (int iteration = 0; iteration < 60; ++iteration) {
-    const double half = 0.25 * (low + high);
-    double term = 1;
-    double sum = 0;
-    for (int i = 0; i < degrees / 2; ++i) {
-      sum += term;
-      term *= half / (i + 1);
-    }
-    (std::exp(-half) * sum > p ? low : high) = 2 * half;
-  }
-  return 0.5 * (low + high);
-}
 
 double feature_chi2(const FeatureObservation& feature, const FeatureObservation::Vector& residual,
                     double extra) {
@@ -94,8 +78,8 @@ double unexplained_sigma(const SheetAdjustmentResult& result, bool by_median) {
 
 // Tests every feature anew, so that one rejected in an early round may return.
 void test_features(SheetAdjustmentResult& result, double extra, double probability) {
-  const double limit2 = chi2_limit(2, probability);
-  const double limit8 = chi2_limit(8, probability);
+  const double limit2 = chi2_quantile(2, probability);
+  const double limit8 = chi2_quantile(8, probability);
   for (std::size_t v = 0; v < result.state.views.size(); ++v) {
     SheetView& view = result.state.views[v];
     for (std::size_t f = 0; f < view.features.size(); ++f) {

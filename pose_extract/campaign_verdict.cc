@@ -44,13 +44,13 @@ void judge_markers(CampaignResult& result) {
   std::map<std::pair<int, int>, std::pair<int, int>> counts;
   std::set<int> once;
   for (const Sighting& sighting : adjusted.sightings) {
-    if (sighting.marker < 0) continue;
+    if (sighting.feature < 0) continue;
     const auto photo = static_cast<std::size_t>(sighting.photo);
     if (sighting.status == SightingStatus::seen_once)
-      once.insert(result.network.markers[static_cast<std::size_t>(sighting.marker)].id);
+      once.insert(result.network.features[static_cast<std::size_t>(sighting.feature)].id);
     // A photograph of another pose says nothing about the markers.
     if (result.photographs[photo].contradicts_pose) continue;
-    auto& [used, rejected] = counts[{sighting.marker, result.network.photos[photo].epoch}];
+    auto& [used, rejected] = counts[{sighting.feature, result.network.photos[photo].epoch}];
     if (sighting.status == SightingStatus::used) ++used;
     if (sighting.status == SightingStatus::outlier) ++rejected;
   }
@@ -60,7 +60,7 @@ void judge_markers(CampaignResult& result) {
       moved[key.first].push_back(result.poses[static_cast<std::size_t>(key.second)].id);
   }
   for (const auto& [marker, poses] : moved) {
-    const int id = result.network.markers[static_cast<std::size_t>(marker)].id;
+    const int id = result.network.features[static_cast<std::size_t>(marker)].id;
     result.findings.emplace_back(
         fmt::format(
             "marker {} stands elsewhere in pose {}: it moved, or another marker has its id; left out there",
@@ -126,7 +126,12 @@ void judge_campaign(const Campaign& campaign, CampaignResult& result) {
   judge_residuals(result);
   // A single bar that gives the scale agrees with itself.
   if (campaign.scale != ScaleFrom::bars || result.bars.size() > 1) {
-    for (const MeasuredLength& bar : result.bars) judge_length("bar", bar, result);
+    for (MeasuredLength bar : result.bars) {
+      // As the bars promise it, before the adjustment widened their sigmas because they contradict each
+      // other.
+      bar.sigma_mm /= result.adjusted.length_inflation;
+      judge_length("bar", bar, result);
+    }
   }
   for (const MeasuredLength& check : result.checks) judge_length("check", check, result);
   for (const DatumFrame* frame : {&result.UG, &result.LG}) {

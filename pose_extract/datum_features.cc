@@ -22,12 +22,12 @@ struct FeaturePoints {
   std::vector<MarkerPoint> names;
   Eigen::Matrix3Xd points, normals, centres;
   Eigen::VectorXd sigma_mm;
-  std::vector<Eigen::Matrix3Xd> by_common;
+  std::vector<Eigen::Matrix3Xd> by_error;
   std::vector<char> used;
   std::optional<Eigen::Vector3d> towards;
 };
 
-FeaturePoints gather(const Network& network, const AdjustmentResult& adjusted, Body body,
+FeaturePoints gather(const Network& network, const AdjustmentResult& adjusted, int body,
                      const Feature& feature) {
   FeaturePoints out;
   out.kind = feature.kind;
@@ -36,18 +36,14 @@ FeaturePoints gather(const Network& network, const AdjustmentResult& adjusted, B
   std::vector<Eigen::Vector3d> centres;
   std::vector<double> sigmas;
   const auto add = [&](int marker, const MarkerPoint& name, bool single) {
-    Eigen::Matrix3Xd by_common;
-    points.push_back(
-        marker_point(network, adjusted.geometry, adjusted.layout, marker, name.corner, &by_common));
-    const Eigen::Matrix3d covariance = by_common * adjusted.common_covariance * by_common.transpose();
-    sigmas.push_back(std::sqrt(std::max(1e-10, covariance.trace() / 3)));
+    EstimatedPoint estimate = adjusted.point(marker, name.corner);
+    points.push_back(estimate.in_body);
+    sigmas.push_back(std::sqrt(std::max(1e-10, estimate.covariance().trace() / 3)));
     normals.emplace_back(
-        adjusted.geometry.body_from_marker[static_cast<std::size_t>(marker)].rotation_matrix().col(2));
-    centres.push_back(name.corner >= 0 && single
-                          ? points.back()
-                          : marker_point(network, adjusted.geometry, adjusted.layout, marker, -1, nullptr));
+        adjusted.geometry.body_from_feature[static_cast<std::size_t>(marker)].rotation_matrix().col(2));
+    centres.push_back(name.corner >= 0 && single ? points.back() : adjusted.point(marker).in_body);
     out.names.push_back(name);
-    out.by_common.push_back(std::move(by_common));
+    out.by_error.push_back(std::move(estimate.by_error));
   };
   for (const MarkerPoint& name : feature.points) {
     const int marker = measured_marker(network, adjusted, body, name.id);
@@ -77,8 +73,7 @@ FeaturePoints gather(const Network& network, const AdjustmentResult& adjusted, B
   if (feature.towards) {
     const int marker = measured_marker(network, adjusted, body, feature.towards->id);
     if (marker >= 0) {
-      out.towards =
-          marker_point(network, adjusted.geometry, adjusted.layout, marker, feature.towards->corner, nullptr);
+      out.towards = adjusted.point(marker, feature.towards->corner).in_body;
     }
   }
   return out;
@@ -233,7 +228,7 @@ void report(const FeaturePoints& points, const char* name, DatumFrame& frame) {
 
 }  // namespace
 
-DatumFrame frame_from_features(const Network& network, const AdjustmentResult& adjusted, Body body,
+DatumFrame frame_from_features(const Network& network, const AdjustmentResult& adjusted, int body,
                                const FeatureFrame& features) {
   DatumFrame frame;
   FeatureSet set{gather(network, adjusted, body, features.z), gather(network, adjusted, body, features.x),
@@ -248,8 +243,8 @@ DatumFrame frame_from_features(const Network& network, const AdjustmentResult& a
   const auto found = construct(set, features.offset_mm, frame.reason);
   if (!found) return frame;
   frame.frame_from_body = *found;
-  frame.by_common = Eigen::Matrix<double, 7, Eigen::Dynamic>::Zero(7, adjusted.layout.size);
-  // Derivatives of the frame by each point, through the fits, then by the common parameters.
+  frame.by_error = Eigen::Matrix<double, 7, Eigen::Dynamic>::Zero(7, adjusted.num_errors());
+  // Derivatives of the frame by each point, through the fits, then by the errors of the adjustment.
   for (FeaturePoints* points : {&set.z, &set.x, &set.origin}) {
     for (Eigen::Index i = 0; i < points->points.cols(); ++i) {
       if (!points->used[static_cast<std::size_t>(i)]) continue;
@@ -268,7 +263,7 @@ DatumFrame frame_from_features(const Network& network, const AdjustmentResult& a
         }
         by_point.col(c) = perturbation_between(*minus, *plus) / (2 * kDifferenceMm);
       }
-      frame.by_common.topRows<6>() += by_point * points->by_common[static_cast<std::size_t>(i)];
+      frame.by_error.topRows<6>() += by_point * points->by_error[static_cast<std::size_t>(i)];
     }
   }
   report(set.z, "z", frame);

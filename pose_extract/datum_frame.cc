@@ -20,7 +20,7 @@ constexpr double kNarrowest = 0.01;  // least width over length of the points th
 struct DatumPoint {
   const NominalPoint* nominal = nullptr;
   Eigen::Vector3d in_body;
-  Eigen::Matrix3Xd by_common;
+  Eigen::Matrix3Xd by_error;
   Eigen::Matrix3d covariance;  // of in_body
   bool used = true;
 };
@@ -29,7 +29,7 @@ using Matrix37d = Eigen::Matrix<double, 3, 7>;
 using Vector7d = Eigen::Matrix<double, 7, 1>;
 using Matrix7d = Eigen::Matrix<double, 7, 7>;
 
-std::vector<DatumPoint> collect_points(const Network& network, const AdjustmentResult& adjusted, Body body,
+std::vector<DatumPoint> collect_points(const Network& network, const AdjustmentResult& adjusted, int body,
                                        const std::vector<NominalPoint>& nominal) {
   std::vector<DatumPoint> points;
   for (const NominalPoint& known : nominal) {
@@ -37,9 +37,10 @@ std::vector<DatumPoint> collect_points(const Network& network, const AdjustmentR
     if (marker < 0) continue;
     DatumPoint point;
     point.nominal = &known;
-    point.in_body = marker_point(network, adjusted.geometry, adjusted.layout, marker, known.point.corner,
-                                 &point.by_common);
-    point.covariance = point.by_common * adjusted.common_covariance * point.by_common.transpose();
+    EstimatedPoint estimate = adjusted.point(marker, known.point.corner);
+    point.in_body = estimate.in_body;
+    point.covariance = estimate.covariance();
+    point.by_error = std::move(estimate.by_error);
     points.push_back(std::move(point));
   }
   return points;
@@ -118,16 +119,17 @@ bool on_a_line(const std::vector<DatumPoint>& points) {
 
 }  // namespace
 
-int measured_marker(const Network& network, const AdjustmentResult& adjusted, Body body, int id) {
-  for (std::size_t m = 0; m < network.markers.size(); ++m) {
-    if (network.markers[m].id == id && network.markers[m].body == body && adjusted.geometry.has_marker[m]) {
+int measured_marker(const Network& network, const AdjustmentResult& adjusted, int body, int id) {
+  for (std::size_t m = 0; m < network.features.size(); ++m) {
+    if (network.features[m].id == id && network.features[m].body == body &&
+        adjusted.geometry.has_feature[m]) {
       return static_cast<int>(m);
     }
   }
   return -1;
 }
 
-DatumFrame frame_from_nominal(const Network& network, const AdjustmentResult& adjusted, Body body,
+DatumFrame frame_from_nominal(const Network& network, const AdjustmentResult& adjusted, int body,
                               const std::vector<NominalPoint>& nominal, bool with_scale) {
   DatumFrame frame;
   std::vector<DatumPoint> points = collect_points(network, adjusted, body, nominal);
@@ -181,7 +183,7 @@ DatumFrame frame_from_nominal(const Network& network, const AdjustmentResult& ad
     frame.scale *= std::exp(step[6]);
     if (step.norm() < 1e-12) break;
   }
-  frame.by_common = Eigen::Matrix<double, 7, Eigen::Dynamic>::Zero(7, adjusted.layout.size);
+  frame.by_error = Eigen::Matrix<double, 7, Eigen::Dynamic>::Zero(7, adjusted.num_errors());
   const Eigen::Matrix3d rotation = frame.frame_from_body.rotation_matrix();
   for (const DatumPoint& point : points) {
     const Eigen::Vector3d measured = frame.frame_from_body * (frame.scale * point.in_body);
@@ -198,7 +200,7 @@ DatumFrame frame_from_nominal(const Network& network, const AdjustmentResult& ad
     Eigen::Matrix<double, 7, 3> gain =
         inverse_normal * jacobian_at(frame.frame_from_body, frame.scale, point.in_body).transpose() * w;
     if (!with_scale) gain.row(6).setZero();
-    frame.by_common -= gain * (frame.scale * rotation) * point.by_common;
+    frame.by_error -= gain * (frame.scale * rotation) * point.by_error;
     frame.own += gain * (point.nominal->sigma_mm * point.nominal->sigma_mm) * gain.transpose();
   }
   frame.ok = true;
@@ -206,16 +208,15 @@ DatumFrame frame_from_nominal(const Network& network, const AdjustmentResult& ad
   return frame;
 }
 
-DatumFrame frame_from_first_marker(const Network& network, const AdjustmentResult& adjusted, Body body) {
+DatumFrame frame_from_first_marker(const Network& network, const AdjustmentResult& adjusted, int body) {
   DatumFrame frame;
-  frame.by_common = Eigen::Matrix<double, 7, Eigen::Dynamic>::Zero(7, adjusted.layout.size);
-  for (std::size_t m = 0; m < network.markers.size(); ++m) {
-    if (network.markers[m].body != body || !adjusted.geometry.has_marker[m]) continue;
-    const Rigid3& body_from_marker = adjusted.geometry.body_from_marker[m];
+  frame.by_error = Eigen::Matrix<double, 7, Eigen::Dynamic>::Zero(7, adjusted.num_errors());
+  for (std::size_t m = 0; m < network.features.size(); ++m) {
+    if (network.features[m].body != body || !adjusted.geometry.has_feature[m]) continue;
+    const Rigid3& body_from_marker = adjusted.geometry.body_from_feature[m];
     frame.frame_from_body = inverse(body_from_marker);
-    if (adjusted.layout.marker_pose[m] >= 0) {
-      frame.by_common.block<6, 6>(0, adjusted.layout.marker_pose[m]) = inverse_jacobian(body_from_marker);
-    }
+    frame.by_error.topRows<6>() =
+        inverse_jacobian(body_from_marker) * adjusted.body_from_feature(static_cast<int>(m)).by_error;
     frame.ok = true;
     frame.reason.clear();
     return frame;

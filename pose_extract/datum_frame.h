@@ -18,14 +18,14 @@ struct DatumResidual {
 };
 
 /// A body's datum frame. Its error, a perturbation of frame_from_body as in covariance.h with the relative
-/// error of `scale` as seventh entry, is by_common times the error of the adjustment's common parameters plus
-/// own noise.
+/// error of `scale` as seventh entry, is by_error times the errors of the adjustment (adjustment_result.h)
+/// plus own noise.
 struct DatumFrame {
   bool ok = false;
   std::string reason = "not defined";  ///< why it is not ok
   Rigid3 frame_from_body;              ///< applied to the body's coordinates times scale
   double scale = 1;                    ///< from nominal coordinates when asked for
-  Eigen::Matrix<double, 7, Eigen::Dynamic> by_common;
+  Eigen::Matrix<double, 7, Eigen::Dynamic> by_error;
   Eigen::Matrix<double, 7, 7> own = Eigen::Matrix<double, 7, 7>::Zero();
   std::vector<DatumResidual> residuals;
   std::vector<std::string> notes;  ///< form errors (flatness, roundness), rejected points
@@ -34,19 +34,18 @@ struct DatumFrame {
 /// Weighted best fit (Helmert; with_scale adds the seventh parameter) of a body's measured points to nominal
 /// coordinates, never warping them; robust to wrong ones, which are listed.
 [[nodiscard]] DatumFrame frame_from_nominal(const Network& network, const AdjustmentResult& adjusted,
-                                            Body body, const std::vector<NominalPoint>& nominal,
+                                            int body, const std::vector<NominalPoint>& nominal,
                                             bool with_scale);
 
 /// 3-2-1 frame from features (plane, line, circle, cylinder, sphere, point), see FeatureFrame.
 [[nodiscard]] DatumFrame frame_from_features(const Network& network, const AdjustmentResult& adjusted,
-                                             Body body, const FeatureFrame& features);
+                                             int body, const FeatureFrame& features);
 
 /// Frame of the lowest marker of a body: for projects that define none.
 [[nodiscard]] DatumFrame frame_from_first_marker(const Network& network, const AdjustmentResult& adjusted,
-                                                 Body body);
+                                                 int body);
 
 /// Index of a marker in the network; -1 if it is not there or was not measured.
-[[nodiscard]] int measured_marker(const Network& network, const AdjustmentResult& adjusted, Body body,
-                                  int id);
+[[nodiscard]] int measured_marker(const Network& network, const AdjustmentResult& adjusted, int body, int id);
 
 }  // namespace hexcal

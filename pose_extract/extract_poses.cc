@@ -19,8 +19,8 @@ namespace hexcal {
 namespace {
 
 int marker_index(const Network& network, int id) {
-  for (std::size_t m = 0; m < network.markers.size(); ++m) {
-    if (network.markers[m].id == id) return static_cast<int>(m);
+  for (std::size_t m = 0; m < network.features.size(); ++m) {
+    if (network.features[m].id == id) return static_cast<int>(m);
   }
   return -1;
 }
@@ -31,8 +31,8 @@ Network make_network(const Campaign& campaign, const CampaignObservations& obser
   for (const CalibratedCamera& camera : observations.cameras) {
     network.cameras.push_back({camera.model, camera.covariance});
   }
-  for (const auto& [id, size] : campaign.fixed) network.markers.push_back({id, Body::fixed, size});
-  for (const auto& [id, size] : campaign.moving) network.markers.push_back({id, Body::moving, size});
+  for (const auto& [id, size] : campaign.fixed) (void)network.add_square(id, kReferenceBody, size);
+  for (const auto& [id, size] : campaign.moving) (void)network.add_square(id, kMovingBody, size);
   std::map<std::string, int> epoch_of;
   for (const std::string& pose : observations.poses) {
     const int next = static_cast<int>(epoch_of.size());
@@ -44,7 +44,10 @@ Network make_network(const Campaign& campaign, const CampaignObservations& obser
     NetworkPhoto photo;
     photo.camera = std::max(0, photograph.camera);
     photo.epoch = epoch_of.at(photograph.pose);
-    if (is_used(photographs[p].status)) photo.markers = photograph.seen.markers;
+    if (is_used(photographs[p].status)) {
+      for (const MarkerObservation& seen : photograph.seen.markers)
+        photo.observations.push_back(observation_of(seen));
+    }
     network.photos.push_back(std::move(photo));
   }
   for (const KnownLength& bar : campaign.bars) {
@@ -57,10 +60,9 @@ Network make_network(const Campaign& campaign, const CampaignObservations& obser
 bool seen_twice(const Network& network, int marker) {
   int times = 0;
   for (const NetworkPhoto& photo : network.photos) {
-    times +=
-        static_cast<int>(std::count_if(photo.markers.begin(), photo.markers.end(), [&](const auto& seen) {
-          return seen.id == network.markers[static_cast<std::size_t>(marker)].id &&
-                 seen.status == MarkerStatus::ok;
+    times += static_cast<int>(
+        std::count_if(photo.observations.begin(), photo.observations.end(), [&](const auto& seen) {
+          return seen.id == network.features[static_cast<std::size_t>(marker)].id && seen.measured;
         }));
   }
   return times >= 2;
@@ -69,7 +71,7 @@ bool seen_twice(const Network& network, int marker) {
 // Without a single measured bar the scale would be open: the markers' sizes have to do, said aloud.
 void choose_scale(const Campaign& campaign, CampaignResult& result, AdjustmentOptions& options) {
   std::erase_if(result.network.lengths, [&](const NetworkLength& length) {
-    return !seen_twice(result.network, length.marker_a) || !seen_twice(result.network, length.marker_b);
+    return !seen_twice(result.network, length.feature_a) || !seen_twice(result.network, length.feature_b);
   });
   options.print_scale_free = campaign.scale == ScaleFrom::bars;
   options.print_scale_sigma = campaign.print_scale_sigma;
@@ -79,7 +81,7 @@ void choose_scale(const Campaign& campaign, CampaignResult& result, AdjustmentOp
   }
 }
 
-DatumFrame body_frame(const CampaignResult& result, const std::optional<FrameRule>& rule, Body body,
+DatumFrame body_frame(const CampaignResult& result, const std::optional<FrameRule>& rule, int body,
                       bool with_scale) {
   if (!rule) return frame_from_first_marker(result.network, result.adjusted, body);
   if (rule->from == FrameRule::From::features) {
@@ -92,7 +94,7 @@ DatumFrame body_frame(const CampaignResult& result, const std::optional<FrameRul
 std::vector<int> poses_of_map(const CampaignResult& result, int wanted) {
   std::vector<int> with_photographs;
   for (const NetworkPhoto& photo : result.network.photos) {
-    if (!photo.markers.empty()) with_photographs.push_back(photo.epoch);
+    if (!photo.observations.empty()) with_photographs.push_back(photo.epoch);
   }
   std::sort(with_photographs.begin(), with_photographs.end());
   with_photographs.erase(std::unique(with_photographs.begin(), with_photographs.end()),
@@ -105,9 +107,8 @@ std::vector<int> poses_of_map(const CampaignResult& result, int wanted) {
   return chosen;
 }
 
-double scale_sigma(const CampaignResult& result, const DatumFrame& frame) {
-  const Eigen::RowVectorXd row = frame.by_common.row(6);
-  return std::sqrt((row * result.adjusted.common_covariance * row.transpose())(0) + frame.own(6, 6));
+double scale_sigma(const DatumFrame& frame) {
+  return std::sqrt(frame.by_error.row(6).squaredNorm() + frame.own(6, 6));
 }
 
 // Stated sizes of the markers beside the source of the scale; empty if they agree.
@@ -120,12 +121,12 @@ std::string print_scale_words(double larger, double sigma, const char* source) {
 }
 
 // Nominal coordinates beside another source of scale: do they agree?
-void compare_nominal_scale(const CampaignResult& base, const std::optional<FrameRule>& rule, Body body,
+void compare_nominal_scale(const CampaignResult& base, const std::optional<FrameRule>& rule, int body,
                            const char* name, std::vector<Finding>& findings) {
   if (!rule || rule->from != FrameRule::From::nominal) return;
   const DatumFrame scaled = frame_from_nominal(base.network, base.adjusted, body, rule->nominal, true);
   if (!scaled.ok) return;
-  const double sigma = scale_sigma(base, scaled);
+  const double sigma = scale_sigma(scaled);
   if (std::abs(scaled.scale - 1) <= kScaleDisagreementSigmas * sigma) return;
   findings.push_back(
       fmt::format("{}'s nominal coordinates are {:.4f} % larger than measured (sigma {:.4f} %): they "
@@ -139,7 +140,7 @@ Rigid3 scaled_motion(const Rigid3& motion, double scale) {
 
 // Error of a motion as multiples of the errors it depends on.
 struct MotionInfluence {
-  Matrix6Xd by_common;
+  Matrix6Xd by_error;
   Vector6d by_scale = Vector6d::Zero();
   Matrix6d by_epoch = Matrix6d::Zero();  // of the epoch's own noise
 };
@@ -148,9 +149,10 @@ MotionInfluence epoch_influence(const AdjustmentResult& adjusted, std::size_t ep
   MotionInfluence influence;
   Vector6d lengths = Vector6d::Ones();
   lengths.head<3>() *= scale;
-  influence.by_common = -(lengths.asDiagonal() * adjusted.epochs[epoch].by_common);
+  influence.by_error = lengths.asDiagonal() * adjusted.reference_from_body(static_cast<int>(epoch)).by_error;
   influence.by_epoch = lengths.asDiagonal();
-  influence.by_scale.head<3>() = scale * adjusted.geometry.fixed_from_moving[epoch].translation;
+  influence.by_scale.head<3>() =
+      scale * adjusted.geometry.reference_from_body[kMovingBody][epoch].translation;
   return influence;
 }
 
@@ -168,7 +170,7 @@ class PoseChain {
     const AdjustmentResult& adjusted = result_.adjusted;
     const double scale = result_.UG.scale;
     const Rigid3& u = result_.UG.frame_from_body;
-    const Rigid3 t = scaled_motion(adjusted.geometry.fixed_from_moving[epoch], scale);
+    const Rigid3 t = scaled_motion(adjusted.geometry.reference_from_body[kMovingBody][epoch], scale);
     const MotionInfluence ti = epoch_influence(adjusted, epoch, scale);
     const Rigid3 x = u * t;
     const Matrix6d xu = product_jacobian_left(u, t);
@@ -176,15 +178,15 @@ class PoseChain {
 
     EpochPose out;
     CampaignResult::PoseInfluence& influence = out.influence;
-    // UG_from_moving: by the datum (with its scale), the epoch's own noise and the common parameters.
+    // UG_from_moving: by the datum (with its scale), the epoch's own noise and the errors of the adjustment.
     influence.by_ug << xu, xt * ti.by_scale;
     influence.by_own = xt * ti.by_epoch;
-    influence.by_common = xt * ti.by_common;
+    influence.by_error = xt * ti.by_error;
     Rigid3 moving_from_LG;
     Matrix6d zl;
     if (result_.home_epoch >= 0) {
       const auto home = static_cast<std::size_t>(result_.home_epoch);
-      const Rigid3 th = scaled_motion(adjusted.geometry.fixed_from_moving[home], scale);
+      const Rigid3 th = scaled_motion(adjusted.geometry.reference_from_body[kMovingBody][home], scale);
       const MotionInfluence hi = epoch_influence(adjusted, home, scale);
       const Rigid3 y = u * th;
       const Rigid3 down = Rigid3::from_translation({0, 0, -gd_mm_});
@@ -198,7 +200,7 @@ class PoseChain {
       influence.by_ug = zx * influence.by_ug + zl * y_by_ug;
       influence.by_own = zx * influence.by_own;
       influence.by_home = zl * yt * hi.by_epoch;
-      influence.by_common = zx * influence.by_common + zl * (yt * hi.by_common);
+      influence.by_error = zx * influence.by_error + zl * (yt * hi.by_error);
     } else {
       const Rigid3& m = result_.LG.frame_from_body;
       moving_from_LG = inverse(m);
@@ -206,7 +208,7 @@ class PoseChain {
       const Matrix6d zx = product_jacobian_left(x, moving_from_LG);
       influence.by_ug = zx * influence.by_ug;
       influence.by_own = zx * influence.by_own;
-      influence.by_common = zx * influence.by_common + zl * result_.LG.by_common.topRows<6>();
+      influence.by_error = zx * influence.by_error + zl * result_.LG.by_error.topRows<6>();
       influence.by_lg.leftCols<6>() = zl;
     }
     out.pose = pose_from_ug_from_lg(x * moving_from_LG, gd_mm_);
@@ -215,8 +217,8 @@ class PoseChain {
     influence.by_lg = parameters * influence.by_lg;
     influence.by_own = parameters * influence.by_own;
     influence.by_home = parameters * influence.by_home;
-    // The datum's own error also follows the common parameters.
-    influence.by_common = parameters * influence.by_common + influence.by_ug * result_.UG.by_common;
+    // The datum's own error also follows the errors of the adjustment.
+    influence.by_error = parameters * influence.by_error + influence.by_ug * result_.UG.by_error;
     return out;
   }
 
@@ -229,42 +231,34 @@ MeasuredLength measure_length(const CampaignResult& result, const KnownLength& k
   MeasuredLength length{known, false, 0, 0};
   const int a = marker_index(result.network, known.a.id);
   const int b = marker_index(result.network, known.b.id);
-  const auto& has = result.adjusted.geometry.has_marker;
+  const auto& has = result.adjusted.geometry.has_feature;
   if (a < 0 || b < 0 || !has[static_cast<std::size_t>(a)] || !has[static_cast<std::size_t>(b)]) return length;
-  Eigen::Matrix3Xd ja;
-  Eigen::Matrix3Xd jb;
-  const AdjustmentResult& adjusted = result.adjusted;
-  const Eigen::Vector3d d =
-      marker_point(result.network, adjusted.geometry, adjusted.layout, b, known.b.corner, &jb) -
-      marker_point(result.network, adjusted.geometry, adjusted.layout, a, known.a.corner, &ja);
-  const Eigen::RowVectorXd row = d.normalized().transpose() * (jb - ja);
+  const EstimatedPoint at_a = result.adjusted.point(a, known.a.corner);
+  const EstimatedPoint at_b = result.adjusted.point(b, known.b.corner);
+  const Eigen::Vector3d d = at_b.in_body - at_a.in_body;
   length.measured = true;
   length.length_mm = result.UG.scale * d.norm();
-  length.sigma_mm = result.UG.scale * std::sqrt((row * adjusted.common_covariance * row.transpose())(0));
+  length.sigma_mm = result.UG.scale * (d.normalized().transpose() * (at_b.by_error - at_a.by_error)).norm();
   return length;
 }
 
 void measure_points(CampaignResult& result) {
   const AdjustmentResult& adjusted = result.adjusted;
-  for (std::size_t m = 0; m < result.network.markers.size(); ++m) {
-    const NetworkMarker& marker = result.network.markers[m];
-    const DatumFrame& datum = marker.body == Body::fixed ? result.UG : result.LG;
-    if (!adjusted.geometry.has_marker[m] || !datum.ok) continue;
+  for (std::size_t m = 0; m < result.network.features.size(); ++m) {
+    const NetworkFeature& marker = result.network.features[m];
+    const DatumFrame& datum = marker.body == kReferenceBody ? result.UG : result.LG;
+    if (!adjusted.geometry.has_feature[m] || !datum.ok) continue;
     const Eigen::Matrix3d rotation = datum.frame_from_body.rotation_matrix();
     for (int c = 0; c < 4; ++c) {
-      Eigen::Matrix3Xd by_common;
-      const Eigen::Vector3d in_body =
-          result.UG.scale * marker_point(result.network, adjusted.geometry, adjusted.layout,
-                                         static_cast<int>(m), c, &by_common);
-      const Eigen::Vector3d turned = rotation * in_body;
+      const EstimatedPoint point = adjusted.point(static_cast<int>(m), c);
+      const Eigen::Vector3d turned = rotation * (result.UG.scale * point.in_body);
       Eigen::Matrix<double, 3, 7> by_datum;
       by_datum << Eigen::Matrix3d::Identity(), -skew(turned), turned;
-      const Eigen::Matrix3Xd total = result.UG.scale * rotation * by_common + by_datum * datum.by_common;
+      const Eigen::Matrix3Xd total = result.UG.scale * rotation * point.by_error + by_datum * datum.by_error;
       result.points.push_back({{marker.id, c},
                                marker.body,
                                turned + datum.frame_from_body.translation,
-                               total * adjusted.common_covariance * total.transpose() +
-                                   by_datum * datum.own * by_datum.transpose()});
+                               total * total.transpose() + by_datum * datum.own * by_datum.transpose()});
     }
   }
 }
@@ -276,11 +270,12 @@ void measure_stations(CampaignResult& result) {
   for (std::size_t p = 0; p < result.photographs.size(); ++p) {
     MeasuredPhotograph& photograph = result.photographs[p];
     if (!adjusted.geometry.has_photo[p] || !ug.ok) continue;
-    const Rigid3 fixed_from_camera = inverse(scaled_motion(adjusted.geometry.camera_from_fixed[p], ug.scale));
+    const Rigid3 fixed_from_camera =
+        inverse(scaled_motion(adjusted.geometry.camera_from_reference[p], ug.scale));
     photograph.UG_from_camera = ug.frame_from_body * fixed_from_camera;
-    const Matrix6d camera = photo_covariance(adjusted, static_cast<int>(p), result.network.photos[p].epoch);
+    const Matrix6d camera = adjusted.camera_from_reference(static_cast<int>(p)).covariance();
     const Matrix6d j = product_jacobian_right(ug.frame_from_body, fixed_from_camera) *
-                       inverse_jacobian(scaled_motion(adjusted.geometry.camera_from_fixed[p], ug.scale));
+                       inverse_jacobian(scaled_motion(adjusted.geometry.camera_from_reference[p], ug.scale));
     const Matrix6d left = product_jacobian_left(ug.frame_from_body, fixed_from_camera);
     photograph.covariance =
         j * camera * j.transpose() + left * ug.own.topLeftCorner<6, 6>() * left.transpose();
@@ -307,13 +302,14 @@ Matrix6d CampaignResult::pose_covariance(std::size_t a, std::size_t b) const {
   if (!poses[a].pose || !poses[b].pose) return Matrix6d::Zero();
   const PoseInfluence& ia = influences[a];
   const PoseInfluence& ib = influences[b];
-  Matrix6d covariance = ia.by_common * adjusted.common_covariance * ib.by_common.transpose() +
-                        ia.by_ug * UG.own * ib.by_ug.transpose() + ia.by_lg * LG.own * ib.by_lg.transpose();
+  Matrix6d covariance = ia.by_error * ib.by_error.transpose() + ia.by_ug * UG.own * ib.by_ug.transpose() +
+                        ia.by_lg * LG.own * ib.by_lg.transpose();
   if (home_epoch >= 0) {
-    covariance +=
-        ia.by_home * adjusted.epochs[static_cast<std::size_t>(home_epoch)].own * ib.by_home.transpose();
+    covariance += ia.by_home * adjusted.reference_from_body(home_epoch).own * ib.by_home.transpose();
   }
-  if (a == b) covariance += ia.by_own * adjusted.epochs[a].own * ib.by_own.transpose();
+  if (a == b) {
+    covariance += ia.by_own * adjusted.reference_from_body(static_cast<int>(a)).own * ib.by_own.transpose();
+  }
   return covariance;
 }
 
@@ -353,6 +349,12 @@ CampaignResult extract_poses(const Campaign& campaign, const CampaignObservation
       options.map_poses > 0 && options.map_poses < result.network.num_epochs
           ? adjust_network_by_map(result.network, poses_of_map(result, options.map_poses), chosen.adjustment)
           : adjust_network(result.network, chosen.adjustment);
+  if (chosen.adjustment.print_scale_free && !result.adjusted.print_scale()) {
+    result.findings.emplace_back(
+        "no scale bar could be used, for the markers at their ends are not in the network: the scale is that "
+        "of the "
+        "markers' sizes");
+  }
   result.poses.resize(observations.poses.size());
   result.influences.resize(observations.poses.size());
   for (std::size_t e = 0; e < result.poses.size(); ++e) result.poses[e].id = observations.poses[e];
@@ -366,9 +368,9 @@ CampaignResult extract_poses(const Campaign& campaign, const CampaignObservation
 
   const bool nominal_scale = campaign.scale == ScaleFrom::nominal;
   const bool by_ug = nominal_scale && campaign.ug && campaign.ug->from == FrameRule::From::nominal;
-  result.UG = body_frame(result, campaign.ug, Body::fixed, by_ug);
+  result.UG = body_frame(result, campaign.ug, kReferenceBody, by_ug);
   if (!campaign.moving.empty() && !from_home) {
-    result.LG = body_frame(result, campaign.lg, Body::moving, nominal_scale && !by_ug);
+    result.LG = body_frame(result, campaign.lg, kMovingBody, nominal_scale && !by_ug);
     if (nominal_scale && !by_ug) {
       // The moving body's scale holds for both; its noise is small beside the datum's and stays with LG.
       result.UG.scale = result.LG.scale;
@@ -377,26 +379,25 @@ CampaignResult extract_poses(const Campaign& campaign, const CampaignObservation
   std::string sizes;
   const DatumFrame& scaled = by_ug ? result.UG : result.LG;
   if (nominal_scale && scaled.ok) {
-    sizes = print_scale_words(scaled.scale - 1, scale_sigma(result, scaled), "nominal coordinates");
-  } else if (campaign.scale == ScaleFrom::bars && result.adjusted.layout.print_scale >= 0) {
-    const Eigen::Index i = result.adjusted.layout.print_scale;
-    sizes = print_scale_words(result.adjusted.geometry.print_scale,
-                              std::sqrt(result.adjusted.common_covariance(i, i)), "bars");
+    sizes = print_scale_words(scaled.scale - 1, scale_sigma(scaled), "nominal coordinates");
+  } else if (const auto print = result.adjusted.print_scale(); campaign.scale == ScaleFrom::bars && print) {
+    sizes = print_scale_words(print->value, print->sigma(), "bars");
   }
   if (!sizes.empty()) result.findings.push_back(sizes);
   if (!nominal_scale) {
-    compare_nominal_scale(result, campaign.ug, Body::fixed, "UG", result.findings);
-    compare_nominal_scale(result, campaign.lg, Body::moving, "LG", result.findings);
+    compare_nominal_scale(result, campaign.ug, kReferenceBody, "UG", result.findings);
+    compare_nominal_scale(result, campaign.lg, kMovingBody, "LG", result.findings);
   }
   if (from_home && result.UG.ok) {
     const auto home = static_cast<std::size_t>(result.home_epoch);
-    if (result.adjusted.geometry.has_epoch[home]) {
-      const Rigid3 y = result.UG.frame_from_body *
-                       scaled_motion(result.adjusted.geometry.fixed_from_moving[home], result.UG.scale);
+    if (result.adjusted.geometry.has_pose[kMovingBody][home]) {
+      const Rigid3 y =
+          result.UG.frame_from_body *
+          scaled_motion(result.adjusted.geometry.reference_from_body[kMovingBody][home], result.UG.scale);
       result.LG.ok = true;
       result.LG.reason.clear();
       result.LG.frame_from_body = Rigid3::from_translation({0, 0, campaign.lg->gd_mm}) * y;
-      result.LG.by_common = Eigen::Matrix<double, 7, Eigen::Dynamic>::Zero(7, result.adjusted.layout.size);
+      result.LG.by_error = Eigen::Matrix<double, 7, Eigen::Dynamic>::Zero(7, result.adjusted.num_errors());
     } else {
       result.LG.reason = fmt::format("the home pose '{}' was not measured", observations.poses[home]);
     }
@@ -404,13 +405,13 @@ CampaignResult extract_poses(const Campaign& campaign, const CampaignObservation
   if (result.UG.ok && result.LG.ok) {
     const PoseChain chain(result, campaign.lg->gd_mm);
     for (std::size_t e = 0; e < result.poses.size(); ++e) {
-      if (!result.adjusted.geometry.has_epoch[e]) continue;
+      if (!result.adjusted.geometry.has_pose[kMovingBody][e]) continue;
       EpochPose found = chain.at(e);
       if (static_cast<int>(e) == result.home_epoch) {
         // Zero by definition and depends on nothing; what is left is rounding.
         found.pose = Pose();
         found.influence = {};
-        found.influence.by_common = Matrix6Xd::Zero(6, result.adjusted.layout.size);
+        found.influence.by_error = Matrix6Xd::Zero(6, result.adjusted.num_errors());
       }
       result.poses[e].pose = found.pose;
       result.influences[e] = std::move(found.influence);

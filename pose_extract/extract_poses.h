@@ -120,7 +120,7 @@ struct MeasuredLength {
 
 struct MeasuredPoint {
   MarkerPoint point;
-  Body body = Body::fixed;
+  int body = kReferenceBody;
   Eigen::Vector3d xyz_mm = Eigen::Vector3d::Zero();  ///< in UG; moving ones in LG
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
@@ -138,9 +138,9 @@ struct CampaignResult {
   /// Covariance of the parameters (mm, rad) of two poses by index; zero if one has no pose.
   [[nodiscard]] Matrix6d pose_covariance(std::size_t a, std::size_t b) const;
 
-  /// d(pose parameters)/d(common parameters, datum noise, home epoch's noise, own noise).
+  /// d(pose parameters)/d(errors of the adjustment, datum noise, home epoch's noise, own noise).
   struct PoseInfluence {
-    Matrix6Xd by_common;
+    Matrix6Xd by_error;
     Eigen::Matrix<double, 6, 7> by_ug = Eigen::Matrix<double, 6, 7>::Zero();
     Eigen::Matrix<double, 6, 7> by_lg = Eigen::Matrix<double, 6, 7>::Zero();
     Matrix6d by_home = Matrix6d::Zero();

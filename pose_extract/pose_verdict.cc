@@ -30,14 +30,14 @@ struct EpochEvidence {
 EpochEvidence evidence_of(const CampaignResult& result, std::size_t epoch) {
   EpochEvidence evidence;
   for (const Sighting& sighting : result.adjusted.sightings) {
-    if (sighting.marker < 0) continue;
+    if (sighting.feature < 0) continue;
     if (static_cast<std::size_t>(result.network.photos[static_cast<std::size_t>(sighting.photo)].epoch) !=
         epoch) {
       continue;
     }
     const bool used = sighting.status == SightingStatus::used;
     const bool moving =
-        result.network.markers[static_cast<std::size_t>(sighting.marker)].body == Body::moving;
+        result.network.features[static_cast<std::size_t>(sighting.feature)].body == kMovingBody;
     if (used && !moving) ++evidence.fixed_used;
     if (!moving) continue;
     if (sighting.status == SightingStatus::outlier) ++evidence.moving_rejected;
@@ -45,7 +45,7 @@ EpochEvidence evidence_of(const CampaignResult& result, std::size_t epoch) {
     if (!used) continue;
     ++evidence.moving_used;
     evidence.photos.insert(sighting.photo);
-    evidence.markers.insert(sighting.marker);
+    evidence.markers.insert(sighting.feature);
     evidence.only = evidence.moving_used == 1 ? &sighting : nullptr;
   }
   return evidence;
@@ -53,9 +53,9 @@ EpochEvidence evidence_of(const CampaignResult& result, std::size_t epoch) {
 
 bool flipped_pose_fits(const CampaignResult& result, const Sighting& sighting) {
   const NetworkPhoto& photo = result.network.photos[static_cast<std::size_t>(sighting.photo)];
-  const std::vector<PlanarPose> poses = planar_marker_poses(
-      result.adjusted.geometry.cameras[static_cast<std::size_t>(photo.camera)], sighting.px,
-      result.network.markers[static_cast<std::size_t>(sighting.marker)].size_mm);
+  const std::vector<PlanarPose> poses =
+      planar_marker_poses(result.adjusted.geometry.cameras[static_cast<std::size_t>(photo.camera)],
+                          sighting.px, result.network.features[static_cast<std::size_t>(sighting.feature)]);
   if (poses.size() < 2) return false;
   const double variance = std::max(1e-12, sighting.covariance_px2.trace() / 8) *
                           std::max(1.0, result.adjusted.sigma0 * result.adjusted.sigma0);
@@ -69,11 +69,13 @@ double intersection_angle(const CampaignResult& result, std::size_t epoch, const
   const NetworkGeometry& geometry = result.adjusted.geometry;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const int m : evidence.markers)
-    middle += geometry.body_from_marker[static_cast<std::size_t>(m)].translation;
-  middle = geometry.fixed_from_moving[epoch] * (middle / static_cast<double>(evidence.markers.size()));
+    middle += geometry.body_from_feature[static_cast<std::size_t>(m)].translation;
+  middle = geometry.reference_from_body[kMovingBody][epoch] *
+           (middle / static_cast<double>(evidence.markers.size()));
   std::vector<Eigen::Vector3d> lines;
   for (const int p : evidence.photos)
-    lines.push_back(middle - inverse(geometry.camera_from_fixed[static_cast<std::size_t>(p)]).translation);
+    lines.push_back(middle -
+                    inverse(geometry.camera_from_reference[static_cast<std::size_t>(p)]).translation);
   double angle = 0;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     for (std::size_t j = i + 1; j < lines.size(); ++j)
@@ -113,7 +115,7 @@ void judge_pose(const ExtractOptions& options, const EpochEvidence& evidence, st
                 const CampaignResult& result, MeasuredPose& pose) {
   const NetworkGeometry& geometry = result.adjusted.geometry;
   if (pose.status != PoseStatus::ok) return;
-  if (evidence.moving_used == 0 && evidence.moving_rejected == 0 && !geometry.has_epoch[epoch]) {
+  if (evidence.moving_used == 0 && evidence.moving_rejected == 0 && !geometry.has_pose[kMovingBody][epoch]) {
     const bool connected = evidence.fixed_used > 0;
     if (connected && evidence.moving_unplaced > 0) {
       pose.status = PoseStatus::disconnected;
@@ -267,7 +269,7 @@ void judge_photographs(const CampaignObservations& observations, CampaignResult&
   judge_misplaced(observations, result);
   std::vector<int> known(result.photographs.size(), 0);
   for (const Sighting& sighting : result.adjusted.sightings) {
-    if (sighting.marker >= 0 && sighting.status != SightingStatus::not_measured) {
+    if (sighting.feature >= 0 && sighting.status != SightingStatus::not_measured) {
       ++known[static_cast<std::size_t>(sighting.photo)];
     }
   }
@@ -311,7 +313,7 @@ void judge_poses(const CampaignObservations& observations, const ExtractOptions&
     pose.markers = static_cast<int>(evidence.markers.size());
     if (e < result.adjusted.epoch_residuals.size()) pose.rms_px = result.adjusted.epoch_residuals[e].rms_px;
     if (result.adjusted.status != AdjustmentStatus::nothing_connected &&
-        result.adjusted.geometry.has_epoch[e]) {
+        result.adjusted.geometry.has_pose[kMovingBody][e]) {
       pose.intersection_deg = intersection_angle(result, e, evidence);
     }
     if (pose.status == PoseStatus::ok && result.adjusted.status == AdjustmentStatus::nothing_connected) {

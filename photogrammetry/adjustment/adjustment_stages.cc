@@ -3,8 +3,11 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 
+#include "kinematics/geometry/chi_squared.h"
 #include "kinematics/geometry/median.h"
 
 namespace hexcal {
@@ -13,10 +16,19 @@ namespace {
 constexpr int kMaxIterations = 50;
 constexpr int kRobustRounds = 6;
 constexpr int kOutlierRounds = 8;
-constexpr double kMedianChi2Of8 = 7.344;
 constexpr double kRobustWidth = 4.0;     // robust limit over the robust standard deviation of a sighting
 constexpr double kReadmission = 0.8;     // a rejected sighting returns below this share of the limit
 constexpr double kUndetermined = 1e-13;  // of unit-diagonal normal equations: beyond what rounding leaves
+
+// Median of chi^2, asked for every sighting: from a table.
+double chi2_median(int dof) {
+  static const std::array<double, 9> medians = [] {
+    std::array<double, 9> values{};
+    for (int d = 1; d < 9; ++d) values[static_cast<std::size_t>(d)] = chi2_quantile(d, 0.5);
+    return values;
+  }();
+  return medians[static_cast<std::size_t>(dof)];
+}
 
 // Inverse of normal equations. Combinations of parameters that nothing determines get a very large variance
 // instead of one of any size and sign that rounding makes.
@@ -59,27 +71,12 @@ Eigen::MatrixXd common_covariance(const BundleSystem& system, const BundleLayout
 // Degrees of freedom that priors give: trace of (prior information * covariance).
 double prior_information(const AdjustmentJob& job, const AdjustmentStage& stage) {
   const BundleLayout& layout = stage.layout;
-  BundleSettings settings = stage.settings;
-  // The prior's normal matrix alone: a system without any sighting.
-  const std::vector<double> none(stage.sightings.size(), 0.0);
-  const BundleSystem priors =
-      assemble_bundle(job.network, stage.geometry, stage.sightings, none, layout, settings, 0);
-  const Eigen::Index k = settings.interior_moves ? 0 : layout.num_interior;
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(layout.size, layout.size);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(layout.size);
+  add_priors(job.network, stage.geometry, layout, stage.settings, normal, right);
+  const Eigen::Index k = stage.settings.interior_moves ? 0 : layout.num_interior;
   const Eigen::Index n = layout.size - k;
-  return priors.normal.bottomRightCorner(n, n).cwiseProduct(stage.covariance.bottomRightCorner(n, n)).sum();
-}
-
-BundleLayout without_columns(const BundleLayout& full) {
-  BundleLayout layout;
-  for (const Eigen::MatrixXd& basis : full.interior_basis) {
-    layout.interior.push_back(0);
-    layout.interior_basis.emplace_back(basis.rows(), 0);
-    layout.interior_inverse.emplace_back(0, basis.rows());
-  }
-  layout.interior_start = full.interior_start;
-  layout.marker_pose.assign(full.marker_pose.size(), -1);
-  layout.marker_shape = layout.marker_pose;
-  return layout;
+  return normal.bottomRightCorner(n, n).cwiseProduct(stage.covariance.bottomRightCorner(n, n)).sum();
 }
 
 // What is held needs no columns until the solution is analysed.
@@ -114,15 +111,15 @@ void solve_roughly(const AdjustmentJob& job, AdjustmentStage& stage, double robu
   solve(job, stage, robust_limit, settings);
 }
 
-// A rejected marker of which three corners fit comes back without the fourth.
-bool readmit_by_corners(const AdjustmentJob& job, const AdjustmentStage& stage, Sighting& sighting,
-                        double limit_of_6) {
+// A rejected feature of four points of which three fit comes back without the fourth.
+bool readmit_without_one(const AdjustmentJob& job, const AdjustmentStage& stage, Sighting& sighting,
+                         double limit_of_6) {
   Sighting best;
   double least = limit_of_6;
-  for (std::size_t c = 0; c < 4; ++c) {
+  for (std::size_t c = 0; c < kMaxFeaturePoints; ++c) {
     Sighting trial = sighting;
-    trial.corner_used.fill(true);
-    trial.corner_used[c] = false;
+    trial.point_used.fill(true);
+    trial.point_used[c] = false;
     if (!whiten(trial)) continue;
     const std::vector<Sighting> one{trial};
     const double statistic = test_sightings(job.network, stage.geometry, one, stage.layout, stage.settings,
@@ -132,7 +129,7 @@ bool readmit_by_corners(const AdjustmentJob& job, const AdjustmentStage& stage, 
     least = statistic;
     best = trial;
   }
-  if (best.marker < 0) return false;
+  if (best.feature < 0) return false;
   sighting = best;
   return true;
 }
@@ -159,7 +156,7 @@ void analyse(const AdjustmentJob& job, AdjustmentStage& stage) {
     unknowns = stage.layout.size - (stage.settings.interior_moves ? 0 : stage.layout.num_interior);
   }
   for (const EpochElimination& epoch : stage.system->epochs) {
-    unknowns += 6.0 * static_cast<double>(epoch.photos.size()) + (epoch.has_pose ? 6 : 0);
+    unknowns += 6.0 * static_cast<double>(epoch.stations.size() + epoch.bodies.size());
   }
   stage.redundancy = rows - unknowns;
   if (stage.settings.common_moves) stage.redundancy += prior_information(job, stage);
@@ -173,9 +170,12 @@ std::vector<SightingTest> test_stage(const AdjustmentJob& job, const AdjustmentS
 double solve_robustly(const AdjustmentJob& job, AdjustmentStage& stage) {
   double limit2 = 0;
   for (int round = 0; round < kRobustRounds; ++round) {
-    std::vector<double> squares = present_squares(job, stage);
-    std::erase_if(squares, [](double q) { return q < 0; });
-    const double next = kRobustWidth * kRobustWidth * 8 * std::max(1.0, median(squares) / kMedianChi2Of8);
+    const std::vector<double> squares = present_squares(job, stage);
+    std::vector<double> ratios;
+    for (std::size_t s = 0; s < squares.size(); ++s) {
+      if (squares[s] >= 0) ratios.push_back(squares[s] / chi2_median(stage.sightings[s].rows));
+    }
+    const double next = kRobustWidth * kRobustWidth * 8 * std::max(1.0, median(ratios));
     if (round > 0 && next > 0.5 * limit2) break;
     limit2 = next;
     solve_roughly(job, stage, std::sqrt(limit2));
@@ -185,20 +185,24 @@ double solve_robustly(const AdjustmentJob& job, AdjustmentStage& stage) {
 
 void drop_unsupported(const AdjustmentJob& job, AdjustmentStage& stage) {
   const Network& network = job.network;
-  std::vector<int> photos(network.photos.size(), 0);
-  std::vector<int> epochs(static_cast<std::size_t>(network.num_epochs), 0);
-  std::vector<int> markers(network.markers.size(), 0);
+  NetworkGeometry& geometry = stage.geometry;
+  std::vector<char> photos(network.photos.size(), 0);
+  std::vector<char> features(network.features.size(), 0);
+  std::vector<std::vector<char>> poses(static_cast<std::size_t>(network.num_bodies),
+                                       std::vector<char>(static_cast<std::size_t>(network.num_epochs), 0));
   for (const Sighting& sighting : stage.sightings) {
     if (sighting.status != SightingStatus::used) continue;
     const auto p = static_cast<std::size_t>(sighting.photo);
-    const auto m = static_cast<std::size_t>(sighting.marker);
-    ++photos[p];
-    ++markers[m];
-    if (network.markers[m].body == Body::moving) ++epochs[static_cast<std::size_t>(network.photos[p].epoch)];
+    const auto f = static_cast<std::size_t>(sighting.feature);
+    photos[p] = features[f] = 1;
+    poses[static_cast<std::size_t>(network.features[f].body)]
+         [static_cast<std::size_t>(network.photos[p].epoch)] = 1;
   }
-  for (std::size_t p = 0; p < photos.size(); ++p) stage.geometry.has_photo[p] &= photos[p] > 0;
-  for (std::size_t e = 0; e < epochs.size(); ++e) stage.geometry.has_epoch[e] &= epochs[e] > 0;
-  for (std::size_t m = 0; m < markers.size(); ++m) stage.geometry.has_marker[m] &= markers[m] > 0;
+  for (std::size_t p = 0; p < photos.size(); ++p) geometry.has_photo[p] &= photos[p];
+  for (std::size_t f = 0; f < features.size(); ++f) geometry.has_feature[f] &= features[f];
+  for (std::size_t b = kReferenceBody + 1; b < poses.size(); ++b) {
+    for (std::size_t e = 0; e < poses[b].size(); ++e) geometry.has_pose[b][e] &= poses[b][e];
+  }
 }
 
 void reject_outliers(const AdjustmentJob& job, AdjustmentStage& stage, double robust_limit2) {
@@ -206,8 +210,11 @@ void reject_outliers(const AdjustmentJob& job, AdjustmentStage& stage, double ro
   for (std::size_t s = 0; s < stage.sightings.size(); ++s) {
     if (squares[s] > robust_limit2) stage.sightings[s].status = SightingStatus::outlier;
   }
-  const double base8 = chi2_quantile(8, job.options.outlier_probability);
-  const double base6 = chi2_quantile(6, job.options.outlier_probability);
+  std::map<int, double> limits;  // by rows
+  for (const Sighting& sighting : stage.sightings) limits[sighting.rows] = 0;
+  limits[6] = 0;
+  for (auto& [rows, limit] : limits) limit = chi2_quantile(rows, job.options.outlier_probability);
+  const auto limit_of = [&](int rows) { return limits.at(rows); };
   for (int round = 0; round < kOutlierRounds; ++round) {
     solve_roughly(job, stage, 0);
     analyse(job, stage);
@@ -216,15 +223,15 @@ void reject_outliers(const AdjustmentJob& job, AdjustmentStage& stage, double ro
     double worst = 0;
     for (std::size_t s = 0; s < tests.size(); ++s) {
       if (stage.sightings[s].status != SightingStatus::used) continue;
-      used.push_back(tests[s].statistic * 8 / stage.sightings[s].rows);
+      used.push_back(tests[s].statistic / chi2_median(stage.sightings[s].rows));
       worst = std::max(worst, tests[s].statistic);
     }
     // Covariances that promise too much must not make outliers of everything.
-    const double factor = std::max(1.0, median(used) / kMedianChi2Of8);
+    const double factor = std::max(1.0, median(used));
     bool changed = false;
     for (std::size_t s = 0; s < tests.size(); ++s) {
       Sighting& sighting = stage.sightings[s];
-      const double limit = factor * (sighting.rows == 8 ? base8 : base6);
+      const double limit = factor * limit_of(sighting.rows);
       if (sighting.status == SightingStatus::used) {
         // The worst first: others may only suffer from them.
         if (tests[s].statistic <= limit || tests[s].statistic < 0.2 * worst) continue;
@@ -235,7 +242,7 @@ void reject_outliers(const AdjustmentJob& job, AdjustmentStage& stage, double ro
           sighting.status = SightingStatus::used;
           changed = true;
         } else if (sighting.rows == 8 &&
-                   readmit_by_corners(job, stage, sighting, kReadmission * factor * base6)) {
+                   readmit_without_one(job, stage, sighting, kReadmission * factor * limit_of(6))) {
           sighting.status = SightingStatus::used;
           changed = true;
         }

@@ -47,7 +47,7 @@ double solve_robustly(const AdjustmentJob& job, AdjustmentStage& stage);
 /// Iterated test of every sighting against the rest, after a robust start.
 void reject_outliers(const AdjustmentJob& job, AdjustmentStage& stage, double robust_limit2);
 
-/// Drops photographs, epochs and markers that no used sighting supports any more.
+/// Drops photographs, poses and features that no used sighting supports any more.
 void drop_unsupported(const AdjustmentJob& job, AdjustmentStage& stage);
 
 }  // namespace hexcal

@@ -16,12 +16,6 @@ struct BundleSolution {
   std::optional<BundleSystem> system;
 };
 
-/// Which parameters are estimated: `free_shape` adds the markers' shapes, `free_scale` the print scale.
-/// Markers without used sightings get no columns; the best seen marker of each body holds its frame.
-[[nodiscard]] BundleLayout make_bundle_layout(const Network& network, const NetworkGeometry& geometry,
-                                              const std::vector<Sighting>& sightings, bool free_shape,
-                                              bool free_scale);
-
 /// Levenberg-Marquardt to the minimum of the sum of squares, or with `robust_limit` c > 0 of the redescending
 /// c^2 q / (c^2 + q) of each sighting's sum of squares q (Geman and McClure, 1987).
 [[nodiscard]] BundleSolution solve_bundle_adjustment(const Network& network, const NetworkGeometry& start,

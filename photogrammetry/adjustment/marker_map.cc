@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "photogrammetry/adjustment/adjustment_errors.h"
 #include "photogrammetry/adjustment/adjustment_stages.h"
 #include "photogrammetry/adjustment/adjustment_statistics.h"
 #include "photogrammetry/adjustment/initial_network.h"
@@ -12,14 +13,11 @@
 namespace hexcal {
 namespace {
 
-// The network with the markers of some epochs only; photographs and epochs keep their numbers.
+// The network with the observations of some epochs only; photographs and epochs keep their numbers.
 Network with_epochs(const Network& network, const std::vector<char>& chosen) {
-  Network part{network.cameras, network.markers, {}, network.num_epochs, network.lengths};
-  part.photos.resize(network.photos.size());
-  for (std::size_t p = 0; p < network.photos.size(); ++p) {
-    const NetworkPhoto& photo = network.photos[p];
-    part.photos[p] = {photo.camera, photo.epoch, {}};
-    if (chosen[static_cast<std::size_t>(photo.epoch)]) part.photos[p].markers = photo.markers;
+  Network part = network;
+  for (NetworkPhoto& photo : part.photos) {
+    if (!chosen[static_cast<std::size_t>(photo.epoch)]) photo.observations.clear();
   }
   return part;
 }
@@ -30,9 +28,11 @@ struct EpochMembers {
   std::vector<std::size_t> sightings;
 };
 
-// One epoch as a network of its own, with the map's cameras and markers.
+// One epoch as a network of its own, with the map's cameras and features; `covariance` is that of the common
+// parameters.
 AdjustmentStage start_on_map(const Network& alone, const EpochMembers& members,
-                             const std::vector<Sighting>& sightings, const AdjustmentResult& map) {
+                             const std::vector<Sighting>& sightings, const AdjustmentResult& map,
+                             const Eigen::MatrixXd& covariance) {
   AdjustmentStage stage;
   for (const std::size_t s : members.sightings) {
     stage.sightings.push_back(sightings[s]);
@@ -40,8 +40,8 @@ AdjustmentStage start_on_map(const Network& alone, const EpochMembers& members,
     stage.sightings.back().photo = static_cast<int>(local - members.photos.begin());
   }
   stage.geometry = initial_network(alone, stage.sightings, &map.geometry);
-  stage.layout = map.layout;
-  stage.covariance = map.common_covariance;
+  stage.layout = map.errors->layout;
+  stage.covariance = covariance;
   stage.settings.data_variance = map.sigma0 * map.sigma0;
   stage.settings.common_moves = false;
   stage.settings.converged = 1e-6;  // a thousandth of a standard deviation
@@ -50,7 +50,7 @@ AdjustmentStage start_on_map(const Network& alone, const EpochMembers& members,
 
 // Geometry, covariances and the sightings' fates of an adjusted epoch into the whole.
 void put_epoch(const EpochMembers& members, std::size_t epoch, AdjustmentStage& stage,
-               std::vector<Sighting>& sightings, AdjustmentResult& result) {
+               std::vector<Sighting>& sightings, AdjustmentResult& result, ResultErrors& errors) {
   for (std::size_t i = 0; i < members.sightings.size(); ++i) {
     Sighting& whole = sightings[members.sightings[i]];
     const int photo = whole.photo;
@@ -59,17 +59,19 @@ void put_epoch(const EpochMembers& members, std::size_t epoch, AdjustmentStage& 
   }
   for (std::size_t i = 0; i < members.photos.size(); ++i) {
     const auto p = static_cast<std::size_t>(members.photos[i]);
-    result.geometry.camera_from_fixed[p] = stage.geometry.camera_from_fixed[i];
+    result.geometry.camera_from_reference[p] = stage.geometry.camera_from_reference[i];
     result.geometry.has_photo[p] = stage.geometry.has_photo[i];
   }
-  result.geometry.fixed_from_moving[epoch] = stage.geometry.fixed_from_moving[0];
-  result.geometry.has_epoch[epoch] = stage.geometry.has_epoch[0];
+  for (std::size_t b = kReferenceBody + 1; b < stage.geometry.has_pose.size(); ++b) {
+    result.geometry.reference_from_body[b][epoch] = stage.geometry.reference_from_body[b][0];
+    result.geometry.has_pose[b][epoch] = stage.geometry.has_pose[b][0];
+  }
   if (!stage.system) return;
   EpochElimination& elimination = stage.system->epochs[0];
-  for (PhotoElimination& photo : elimination.photos) {
-    photo.photo = members.photos[static_cast<std::size_t>(photo.photo)];
+  for (StationElimination& station : elimination.stations) {
+    station.photo = members.photos[static_cast<std::size_t>(station.photo)];
   }
-  export_covariances(elimination, epoch, result);
+  add_epoch_errors(elimination, epoch, errors);
 }
 
 }  // namespace
@@ -99,16 +101,27 @@ AdjustmentResult adjust_network_by_map(const Network& network, const std::vector
       members[e].sightings.push_back(s);
     }
   }
+  ResultErrors errors = *result.errors;
+  const Eigen::MatrixXd covariance = errors.root * errors.root.transpose();
+  // Stations of the map are known; those that it did not orient stay open.
+  std::vector<NetworkStation> stations = network.stations;
+  for (std::size_t p = 0; p < network.photos.size(); ++p) {
+    const int station = network.photos[p].station;
+    if (station >= 0 && result.geometry.has_photo[p])
+      stations[static_cast<std::size_t>(station)].camera_from_reference =
+          result.geometry.camera_from_reference[p];
+  }
   std::vector<double> redundancy(num_epochs, 0);
   std::vector<char> failed(num_epochs, 0);
   tbb::parallel_for(std::size_t{0}, num_epochs, [&](std::size_t e) {
     if (in_map[e] || members[e].sightings.empty()) return;
-    Network alone{network.cameras, network.markers, {}, 1, {}};
+    Network alone{network.cameras, network.features, network.shapes, stations, {}, 1, network.num_bodies, {}};
     for (const int p : members[e].photos) {
-      alone.photos.push_back({network.photos[static_cast<std::size_t>(p)].camera, 0, {}});
+      const NetworkPhoto& photo = network.photos[static_cast<std::size_t>(p)];
+      alone.photos.push_back({photo.camera, 0, photo.station, {}});
     }
     const AdjustmentJob job{alone, options};
-    AdjustmentStage stage = start_on_map(alone, members[e], sightings, result);
+    AdjustmentStage stage = start_on_map(alone, members[e], sightings, result, covariance);
     drop_unsupported(job, stage);
     if (std::find(stage.geometry.has_photo.begin(), stage.geometry.has_photo.end(), 1) !=
         stage.geometry.has_photo.end()) {
@@ -121,8 +134,9 @@ AdjustmentResult adjust_network_by_map(const Network& network, const std::vector
       redundancy[e] = stage.redundancy;
       failed[e] = stage.converged ? 0 : 1;
     }
-    put_epoch(members[e], e, stage, sightings, result);
+    put_epoch(members[e], e, stage, sightings, result, errors);
   });
+  result.errors = std::make_shared<const ResultErrors>(std::move(errors));
   for (const double r : redundancy) result.redundancy_total += r;
   result.sightings = std::move(sightings);
   summarise_residuals(network, tests, result);

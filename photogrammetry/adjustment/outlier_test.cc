@@ -12,64 +12,53 @@ namespace {
 
 constexpr double kUnchecked = 1e-3;  // redundancy below which a direction counts as unchecked
 
-// Upper quantile of the normal distribution (Abramowitz and Stegun 26.2.23, error below 4.5e-4).
-double normal_quantile(double exceeded) {
-  const double t = std::sqrt(-2 * std::log(exceeded));
-  return t - (2.515517 + 0.802853 * t + 0.010328 * t * t) /
-                 (1 + 1.432788 * t + 0.189269 * t * t + 0.001308 * t * t * t);
-}
-
-using Matrix12d = Eigen::Matrix<double, 12, 12>;
-using Matrix12Xd = Eigen::Matrix<double, 12, Eigen::Dynamic>;
-
-// Rows of the covariance of the common parameters that an epoch touches.
-Eigen::MatrixXd gather_rows(const Eigen::MatrixXd& covariance, const std::vector<int>& columns) {
-  Eigen::MatrixXd rows(static_cast<Eigen::Index>(columns.size()), covariance.cols());
-  for (Eigen::Index j = 0; j < rows.cols(); ++j) {
-    for (Eigen::Index i = 0; i < rows.rows(); ++i) {
-      rows(i, j) = covariance(columns[static_cast<std::size_t>(i)], j);
-    }
-  }
-  return rows;
-}
-
-// How a photograph and its epoch follow the common parameters, P = [photo; epoch].by_common: P C with all
-// common parameters, and P C P^T. Every sighting of the photograph takes its share from these.
+// How an own station (if there is one) and the poses of its epoch follow the common parameters, P = [station;
+// poses].by_common: P C with all common parameters, and P C P^T. Every sighting of the photograph takes its
+// share from these.
 struct FollowedCommon {
-  Matrix12Xd with_all;
-  Matrix12d own;
+  Eigen::MatrixXd with_all;
+  Eigen::MatrixXd own;
 };
 
-FollowedCommon followed_common(const EpochElimination& epoch, const PhotoElimination& photo,
+FollowedCommon followed_common(const EpochElimination& epoch, const StationElimination* station,
                                const Eigen::MatrixXd& rows) {
-  Matrix12Xd p(12, static_cast<Eigen::Index>(epoch.columns.size()));
-  p << photo.by_common, epoch.by_common;
+  const Eigen::Index of_station = station != nullptr ? 6 : 0;
+  const auto width = static_cast<Eigen::Index>(epoch.columns.size());
+  Eigen::MatrixXd p(of_station + epoch.by_common.rows(), width);
+  if (station != nullptr) p.topRows<6>() = station->by_common;
+  if (!epoch.bodies.empty()) p.bottomRows(epoch.by_common.rows()) = epoch.by_common;
   FollowedCommon followed;
   followed.with_all.noalias() = p * rows;
-  Matrix12Xd touched(12, p.cols());
-  for (Eigen::Index i = 0; i < p.cols(); ++i) {
+  Eigen::MatrixXd touched(p.rows(), width);
+  for (Eigen::Index i = 0; i < width; ++i) {
     touched.col(i) = followed.with_all.col(epoch.columns[static_cast<std::size_t>(i)]);
   }
   followed.own.noalias() = touched * p.transpose();
   return followed;
 }
 
-// Covariance of a sighting's prediction (whitened, before the variance factor), by what the photograph and
-// the epoch add of their own and by the common parameters; see PhotoElimination.
+// Covariance of a sighting's prediction (whitened, before the variance factor), by what the station and the
+// poses add of their own and by the common parameters; see StationElimination.
 struct PredictedCovariance {
   Matrix8d own, common;
 };
 
-PredictedCovariance predicted_covariance(const EpochElimination& epoch, const PhotoElimination& photo,
-                                         const SightingJacobian& jacobian, bool moving,
+PredictedCovariance predicted_covariance(const EpochElimination& epoch, const StationElimination* station,
+                                         const FeatureJacobian& jacobian, Eigen::Index pose_row,
                                          const CommonJacobian& common, const FollowedCommon& followed,
                                          const Eigen::MatrixXd& covariance) {
-  Matrix86d by_epoch = -jacobian.photo * photo.by_epoch;
-  if (moving) by_epoch += jacobian.epoch;
-  Eigen::Matrix<double, 8, 12> a;
-  a << -jacobian.photo, -by_epoch;
+  const auto of_poses = 6 * static_cast<Eigen::Index>(epoch.bodies.size());
+  const Eigen::Index of_station = station != nullptr ? 6 : 0;
+  Eigen::Matrix<double, 8, Eigen::Dynamic> a(8, of_station + of_poses);
+  auto by_poses = a.rightCols(of_poses);
+  by_poses.setZero();
+  if (pose_row >= 0) by_poses.middleCols<6>(pose_row) = -jacobian.pose;
+  if (station != nullptr) {
+    a.leftCols<6>() = -jacobian.station;
+    if (of_poses > 0) by_poses.noalias() += jacobian.station * station->by_poses;
+  }
   const Eigen::Index n = common.values.cols();
-  Eigen::Matrix<double, 12, Eigen::Dynamic, 0, 12, CommonJacobian::kMax> with_own(12, n);
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic> with_own(a.cols(), n);
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, CommonJacobian::kMax, CommonJacobian::kMax> own(n,
                                                                                                            n);
   for (Eigen::Index j = 0; j < n; ++j) {
@@ -82,17 +71,13 @@ PredictedCovariance predicted_covariance(const EpochElimination& epoch, const Ph
   PredictedCovariance predicted;
   predicted.common = a * followed.own * a.transpose() + crossed + crossed.transpose() +
                      common.values * own * common.values.transpose();
-  predicted.own = jacobian.photo * photo.inverse * jacobian.photo.transpose();
-  if (epoch.has_pose) predicted.own += by_epoch * epoch.inverse * by_epoch.transpose();
+  predicted.own.setZero();
+  if (station != nullptr) predicted.own += jacobian.station * station->inverse * jacobian.station.transpose();
+  if (of_poses > 0) predicted.own += by_poses * epoch.inverse * by_poses.transpose();
   return predicted;
 }
 
 }  // namespace
-
-double chi2_quantile(int dof, double exceeded) {
-  const double spread = 2.0 / (9.0 * dof);
-  return dof * std::pow(1 - spread + normal_quantile(exceeded) * std::sqrt(spread), 3);
-}
 
 std::vector<SightingTest> test_sightings(const Network& network, const NetworkGeometry& geometry,
                                          const std::vector<Sighting>& sightings, const BundleLayout& layout,
@@ -109,28 +94,32 @@ std::vector<SightingTest> test_sightings(const Network& network, const NetworkGe
   tbb::parallel_for(std::size_t{0}, system.epochs.size(), [&](std::size_t e) {
     if (members[e].empty()) return;
     const EpochElimination& epoch = system.epochs[e];
-    const Eigen::MatrixXd rows = gather_rows(covariance, epoch.columns);
-    const PhotoElimination* photo = nullptr;
+    const Eigen::MatrixXd rows = covariance(epoch.columns, Eigen::all);
+    int photo = -1;
+    const StationElimination* station = nullptr;
     FollowedCommon followed;
-    SightingJacobian jacobian;
+    FeatureJacobian jacobian;
+    jacobian.with_shape = layout.free_shape;
     CommonJacobian common;
     Vector8d r;
     for (const std::size_t s : members[e]) {
       const Sighting& sighting = sightings[s];
-      if (photo == nullptr || photo->photo != sighting.photo) {
-        const auto found = std::find_if(epoch.photos.begin(), epoch.photos.end(),
-                                        [&](const auto& entry) { return entry.photo == sighting.photo; });
-        photo = found == epoch.photos.end() ? nullptr : &*found;
-        if (photo != nullptr) followed = followed_common(epoch, *photo, rows);
+      const bool own_station = has_own_station(network, sighting.photo);
+      if (photo != sighting.photo) {
+        photo = sighting.photo;
+        station = own_station ? epoch.station_of(photo) : nullptr;
+        if (!own_station || station != nullptr) followed = followed_common(epoch, station, rows);
       }
-      const bool moving = network.markers[static_cast<std::size_t>(sighting.marker)].body == Body::moving;
+      const int body = network.features[static_cast<std::size_t>(sighting.feature)].body;
+      const int pose_row = body == kReferenceBody ? -1 : epoch.row_of(body);
       tests[s].statistic = std::numeric_limits<double>::infinity();
-      if (photo == nullptr || (moving && !epoch.has_pose)) continue;
-      if (!sighting_residual(network, geometry, sighting, r, &jacobian)) continue;
-      common_jacobian(layout, network.photos[static_cast<std::size_t>(sighting.photo)].camera, sighting,
-                      jacobian, common);
+      if (own_station && station == nullptr) continue;
+      if (body != kReferenceBody && pose_row < 0) continue;
+      if (!geometry.has_photo[static_cast<std::size_t>(photo)]) continue;
+      if (!whitened_residual(network, geometry, sighting, r, &jacobian)) continue;
+      common_jacobian(network, layout, sighting, jacobian, common);
       PredictedCovariance predicted =
-          predicted_covariance(epoch, *photo, jacobian, moving, common, followed, covariance);
+          predicted_covariance(epoch, station, jacobian, pose_row, common, followed, covariance);
       predicted.own /= settings.data_variance;
       predicted.common /= settings.data_variance;
       // What a sighting helped to estimate follows its error; what it had no part in adds its own.

@@ -6,9 +6,6 @@
 
 namespace hexcal {
 
-/// Upper quantile of chi^2 (Wilson and Hilferty 1931) at the probability `exceeded`.
-[[nodiscard]] double chi2_quantile(int dof, double exceeded);
-
 struct SightingTest {
   /// Squared misfit over its covariance: for a used sighting how much its presence raises the sum of squares
   /// (chi^2 with `rows` degrees of freedom), for one left out how far it lies from its prediction.
@@ -16,7 +13,7 @@ struct SightingTest {
   double redundancy = 0;  ///< mean redundancy number of its rows
 };
 
-/// Tests each sighting whose photograph, epoch and marker are known, used or left out. `system` is undamped
+/// Tests each sighting whose photograph, pose and feature are known, used or left out. `system` is undamped
 /// and `covariance` that of the common parameters.
 [[nodiscard]] std::vector<SightingTest> test_sightings(
     const Network& network, const NetworkGeometry& geometry, const std::vector<Sighting>& sightings,

@@ -13,11 +13,12 @@ namespace {
 constexpr int kRefinements = 8;
 
 // Homography from the marker's plane (mm, centred) to normalised image coordinates.
-std::optional<Eigen::Matrix3d> plane_homography(const std::array<Eigen::Vector2d, 4>& image, double size_mm) {
+std::optional<Eigen::Matrix3d> plane_homography(const std::array<Eigen::Vector2d, 4>& image,
+                                                const DrawnPoints& drawn_mm) {
   Eigen::Matrix<double, 8, 8> a = Eigen::Matrix<double, 8, 8>::Zero();
   Vector8d b;
   for (int c = 0; c < 4; ++c) {
-    const Eigen::Vector3d corner = corner_in_marker(c, size_mm, SquareShape::Zero());
+    const Eigen::Vector3d corner = drawn_mm.col(c);
     const Eigen::Vector2d& n = image[static_cast<std::size_t>(c)];
     a.block<1, 8>(2 * c, 0) << corner.x(), corner.y(), 1, 0, 0, 0, -n.x() * corner.x(), -n.x() * corner.y();
     a.block<1, 8>(2 * c + 1, 0) << 0, 0, 0, corner.x(), corner.y(), 1, -n.y() * corner.x(),
@@ -35,11 +36,11 @@ std::optional<Eigen::Matrix3d> plane_homography(const std::array<Eigen::Vector2d
 
 // Translation that fits the corners best in the image for a given rotation (linear least squares).
 Eigen::Vector3d translation_for(const Eigen::Matrix3d& rotation, const std::array<Eigen::Vector2d, 4>& image,
-                                double size_mm) {
+                                const DrawnPoints& drawn_mm) {
   Eigen::Matrix<double, 8, 3> a;
   Vector8d b;
   for (int c = 0; c < 4; ++c) {
-    const Eigen::Vector3d x = rotation * corner_in_marker(c, size_mm, SquareShape::Zero());
+    const Eigen::Vector3d x = rotation * drawn_mm.col(c);
     const Eigen::Vector2d& n = image[static_cast<std::size_t>(c)];
     a.row(2 * c) << 1, 0, -n.x();
     a.row(2 * c + 1) << 0, 1, -n.y();
@@ -50,7 +51,7 @@ Eigen::Vector3d translation_for(const Eigen::Matrix3d& rotation, const std::arra
 }
 
 std::vector<Rigid3> closed_form(const Eigen::Matrix3d& h, const std::array<Eigen::Vector2d, 4>& image,
-                                double size_mm) {
+                                const DrawnPoints& drawn_mm) {
   const double p = h(0, 2);
   const double q = h(1, 2);
   Eigen::Matrix2d jacobian;  // of the homography at the marker's centre
@@ -76,7 +77,7 @@ std::vector<Rigid3> closed_form(const Eigen::Matrix3d& h, const std::array<Eigen
     rotation.col(1) << r.col(1), sign * b2;
     rotation.col(2) = rotation.col(0).cross(rotation.col(1));
     rotation = to_sight * rotation;
-    const Eigen::Vector3d translation = translation_for(rotation, image, size_mm);
+    const Eigen::Vector3d translation = translation_for(rotation, image, drawn_mm);
     // The marker must be in front and show its face.
     if (translation.z() > 0 && rotation.col(2).dot(translation) < 0)
       poses.emplace_back(rotation, translation);
@@ -87,33 +88,33 @@ std::vector<Rigid3> closed_form(const Eigen::Matrix3d& h, const std::array<Eigen
 }  // namespace
 
 std::vector<PlanarPose> planar_marker_poses(const CameraModel& camera, const Vector8d& corners_px,
-                                            double size_mm) {
+                                            const NetworkFeature& square) {
   std::array<Eigen::Vector2d, 4> image;
   for (int c = 0; c < 4; ++c) {
     const auto normalised = camera.normalised_from_image(corners_px.segment<2>(2 * c));
     if (!normalised) return {};
     image[static_cast<std::size_t>(c)] = *normalised;
   }
-  const auto homography = plane_homography(image, size_mm);
+  const auto homography = plane_homography(image, square.drawn_mm);
   if (!homography) return {};
   std::vector<PlanarPose> poses;
-  for (Rigid3 pose : closed_form(*homography, image, size_mm)) {
+  for (Rigid3 pose : closed_form(*homography, image, square.drawn_mm)) {
     const Rigid3 marker;
     Vector8d px;
-    SightingJacobian jacobian;
+    FeatureJacobian jacobian;
+    jacobian.with_shape = false;
     bool good = true;
     for (int i = 0; i < kRefinements && good; ++i) {
-      good = project_marker({camera, pose, nullptr, marker}, size_mm, 0, SquareShape::Zero(), px, &jacobian);
+      good = project_drawn({camera, pose, nullptr, marker}, square, px, &jacobian);
       if (!good) break;
-      const Vector6d step = (jacobian.photo.transpose() * jacobian.photo)
+      const Vector6d step = (jacobian.station.transpose() * jacobian.station)
                                 .ldlt()
-                                .solve(jacobian.photo.transpose() * (corners_px - px));
+                                .solve(jacobian.station.transpose() * (corners_px - px));
       good = step.allFinite();
       if (good) pose = perturbed(pose, step);
       if (step.head<3>().norm() < 1e-9 * pose.translation.norm() && step.tail<3>().norm() < 1e-9) break;
     }
-    good =
-        good && project_marker({camera, pose, nullptr, marker}, size_mm, 0, SquareShape::Zero(), px, nullptr);
+    good = good && project_drawn({camera, pose, nullptr, marker}, square, px, nullptr);
     if (good) poses.push_back({pose, (corners_px - px).norm() / std::sqrt(8.0)});
   }
   std::stable_sort(poses.begin(), poses.end(),

@@ -3,7 +3,7 @@
 #include <array>
 #include <vector>
 
-#include "photogrammetry/adjustment/sighting.h"
+#include "photogrammetry/adjustment/projection.h"
 
 namespace hexcal {
 
@@ -19,6 +19,7 @@ struct PlanarPose {
 /// line of sight; which one is true must be decided from other markers or photographs. One or none where the
 /// image allows no more.
 [[nodiscard]] std::vector<PlanarPose> planar_marker_poses(const CameraModel& camera,
-                                                          const Vector8d& corners_px, double size_mm);
+                                                          const Vector8d& corners_px,
+                                                          const NetworkFeature& square);
 
 }  // namespace hexcal

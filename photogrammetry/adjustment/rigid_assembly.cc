@@ -32,12 +32,11 @@ double misfit(const AssemblyEdge& edge, const Rigid3& frame_from_marker) {
   for (const AssemblyView& view : edge.views) {
     const Rigid3 camera_from_marker = view.camera_from_frame * frame_from_marker;
     Vector8d px;
-    if (!project_marker({*view.camera, camera_from_marker, nullptr, marker}, edge.size_mm, 0,
-                        SquareShape::Zero(), px, nullptr)) {
+    if (!project_drawn({*view.camera, camera_from_marker, nullptr, marker}, *edge.feature, px, nullptr)) {
       sum += 1;
       continue;
     }
-    const double d2 = (px - view.sighting->px).squaredNorm() / 4;
+    const double d2 = (px - view.sighting->px).squaredNorm() / view.sighting->points;
     sum += d2 / (d2 + squared_tolerance(*view.sighting));
   }
   return sum / static_cast<double>(edge.views.size());
@@ -59,15 +58,16 @@ void refine(const std::vector<Piece>& pieces, bool frame_unknown, Rigid3& pose) 
         const Rigid3& frame_from_body = frame_unknown ? pose : piece.other;
         const Rigid3& body_from_marker = frame_unknown ? piece.other : pose;
         Vector8d px;
-        SightingJacobian jacobian;
-        if (!project_marker({*view.camera, view.camera_from_frame, &frame_from_body, body_from_marker},
-                            piece.edge->size_mm, 0, SquareShape::Zero(), px, &jacobian)) {
+        FeatureJacobian jacobian;
+        jacobian.with_shape = false;
+        if (!project_drawn({*view.camera, view.camera_from_frame, &frame_from_body, body_from_marker},
+                           *piece.edge->feature, px, &jacobian)) {
           continue;
         }
-        const Matrix86d& j = frame_unknown ? jacobian.epoch : jacobian.marker;
+        const Matrix86d& j = frame_unknown ? jacobian.pose : jacobian.feature;
         const Vector8d r = view.sighting->px - px;
         const double t2 = squared_tolerance(*view.sighting);
-        const double weight = std::pow(t2 / (t2 + r.squaredNorm() / 4), 2);
+        const double weight = std::pow(t2 / (t2 + r.squaredNorm() / view.sighting->points), 2);
         normal += weight * j.transpose() * j;
         right += weight * j.transpose() * r;
       }

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "photogrammetry/adjustment/planar_pose.h"
-#include "photogrammetry/adjustment/sighting.h"
+#include "photogrammetry/adjustment/projection.h"
 
 namespace hexcal {
 
@@ -14,11 +14,12 @@ struct AssemblyView {
   Rigid3 camera_from_frame;
 };
 
-/// One marker seen in one frame; a frame is a photograph, or an epoch whose photographs are oriented.
+/// One marker (a feature of several points) seen in one frame; a frame is a photograph, or an epoch whose
+/// photographs are oriented.
 struct AssemblyEdge {
   int frame = 0;
   int marker = 0;
-  double size_mm = 0;
+  const NetworkFeature* feature = nullptr;
   std::vector<AssemblyView> views;
   std::vector<Rigid3> candidates;  ///< frame_from_marker, both planar solutions of each view
 };

@@ -12,82 +12,10 @@
 #include "tests/support/error_matchers.h"
 #include "tests/support/observation_scene.h"
 #include "tests/support/rigid_matchers.h"
+#include "tests/support/scene_errors.h"
 
 namespace hexcal {
 namespace {
-
-// The fixed body's true frame from the adjustment's: the best fit over all fixed corners.
-Rigid3 true_from_adjusted(const ObservationScene& scene, const AdjustmentResult& result) {
-  Eigen::Matrix3Xd from(3, 0);
-  Eigen::Matrix3Xd to(3, 0);
-  for (std::size_t m = 0; m < scene.network.markers.size(); ++m) {
-    if (scene.network.markers[m].body != Body::fixed || !result.geometry.has_marker[m]) continue;
-    const auto adjusted = marker_corners_in_body(scene.network, result.geometry, static_cast<int>(m));
-    for (int c = 0; c < 4; ++c) {
-      from.conservativeResize(3, from.cols() + 1);
-      to.conservativeResize(3, to.cols() + 1);
-      from.rightCols<1>() = adjusted.col(c);
-      to.rightCols<1>() = scene.body_from_marker[m] *
-                          corner_in_marker(c, scene.network.markers[m].size_mm, scene.shape_mm[m]);
-    }
-  }
-  const Eigen::Matrix4d t = Eigen::umeyama(from, to, false);
-  return {Eigen::Matrix3d(t.topLeftCorner<3, 3>()), t.topRightCorner<3, 1>()};
-}
-
-struct PoseErrors {
-  double rms_um = 0, rms_mdeg = 0;
-};
-
-// 3D rms of the motions from home to each pose, in true axes: free of the gauge of both bodies.
-PoseErrors pose_errors(const ObservationScene& scene, const AdjustmentResult& result) {
-  const Rigid3 to_true = true_from_adjusted(scene, result);
-  const std::vector<Rigid3>& found_from_moving = result.geometry.fixed_from_moving;
-  double mm2 = 0;
-  double rad2 = 0;
-  double count = 0;
-  for (std::size_t e = 1; e < scene.fixed_from_moving.size(); ++e) {
-    if (!result.geometry.has_epoch[e]) continue;
-    const Rigid3 found = to_true * found_from_moving[e] * inverse(found_from_moving[0]) * inverse(to_true) *
-                         scene.fixed_from_moving[0];
-    const Vector6d delta = perturbation_between(scene.fixed_from_moving[e], found);
-    mm2 += delta.head<3>().squaredNorm();
-    rad2 += delta.tail<3>().squaredNorm();
-    count += 1;
-  }
-  return {std::sqrt(mm2 / count) * 1e3, std::sqrt(rad2 / count) * kDegPerRad * 1e3};
-}
-
-// Normalised squares (per degree of freedom) of the error of each epoch's motion relative to the home epoch,
-// expressed in the adjustment's own frame, where the covariance is known.
-double mean_normalised_square(const ObservationScene& scene, const AdjustmentResult& result) {
-  const Rigid3 to_true = true_from_adjusted(scene, result);
-  double sum = 0;
-  int count = 0;
-  const Rigid3& home = result.geometry.fixed_from_moving[0];
-  for (std::size_t e = 1; e < scene.fixed_from_moving.size(); ++e) {
-    const Rigid3& pose = result.geometry.fixed_from_moving[e];
-    // moving(home)_from_moving(e) does not depend on the fixed body's gauge; the moving body's remains and is
-    // taken from the truth by comparing in the home epoch.
-    const Rigid3 found = inverse(home) * pose;
-    const Rigid3 adjusted_from_true_moving = inverse(home) * inverse(to_true) * scene.fixed_from_moving[0];
-    const Rigid3 truth = adjusted_from_true_moving * inverse(scene.fixed_from_moving[0]) *
-                         scene.fixed_from_moving[e] * inverse(adjusted_from_true_moving);
-    const Vector6d delta = perturbation_between(truth, found);
-    const Matrix6d jh = product_jacobian_left(inverse(home), pose) * inverse_jacobian(home);
-    const Matrix6d je = product_jacobian_right(inverse(home), pose);
-    const int i = static_cast<int>(e);
-    const Matrix6d cross = jh * epoch_covariance(result, 0, i) * je.transpose();
-    const Matrix6d covariance = jh * epoch_covariance(result, 0, 0) * jh.transpose() +
-                                je * epoch_covariance(result, i, i) * je.transpose() + cross +
-                                cross.transpose();
-    for (int k = 0; k < 6; ++k) {
-      sum += delta[k] * delta[k] / covariance(k, k);
-      ++count;
-    }
-  }
-  return sum / count;
-}
 
 void expect_exact(const ObservationScene& scene, const AdjustmentResult& result) {
   ASSERT_EQ(result.status, AdjustmentStatus::ok) << result.reason;
@@ -152,7 +80,7 @@ TEST(Adjustment, AFixedInteriorOrientationWidensTheSigmas) {
   const AdjustmentResult refined = adjust_network(scene.network, adjust);
   adjust.interior = AdjustmentOptions::Interior::fixed;
   const AdjustmentResult fixed = adjust_network(scene.network, adjust);
-  EXPECT_GT(epoch_covariance(fixed, 3, 3).trace(), epoch_covariance(refined, 3, 3).trace());
+  EXPECT_GT(fixed.pose_covariance(3, 3).trace(), refined.pose_covariance(3, 3).trace());
   EXPECT_LT(pose_errors(scene, refined).rms_um, 2.0);
 }
 
@@ -197,7 +125,7 @@ TEST(Adjustment, BarsGiveTheScaleOfMisprintedMarkers) {
 }
 
 std::size_t fixed_observation(const ObservationScene& scene, std::size_t photo) {
-  const auto& markers = scene.network.photos[photo].markers;
+  const auto& markers = scene.network.photos[photo].observations;
   for (std::size_t i = 0; i < markers.size(); ++i) {
     if (markers[i].id < 100) return i;
   }
@@ -212,19 +140,19 @@ TEST(Adjustment, MovedFixedMarkerIsLeftOutOfItsPose) {
   const Rigid3 moved = Rigid3::from_translation({0.5, -0.3, 0.4}) * scene.body_from_marker[2];
   int touched = 0;
   for (std::size_t p = 12; p < 15; ++p) {  // the photographs of epoch 4
-    for (MarkerObservation& seen : scene.network.photos[p].markers) {
+    for (Observation& seen : scene.network.photos[p].observations) {
       if (seen.id != 2) continue;
       Vector8d px;
-      ASSERT_TRUE(project_marker({scene.true_camera, scene.camera_from_fixed[p], nullptr, moved}, 24, 0,
-                                 SquareShape::Zero(), px, nullptr));
-      for (int c = 0; c < 4; ++c) seen.corners_px[static_cast<std::size_t>(c)] = px.segment<2>(2 * c);
+      ASSERT_TRUE(project_drawn({scene.true_camera, scene.camera_from_fixed[p], nullptr, moved},
+                                scene.network.features[2], px, nullptr));
+      seen.px = px;
       ++touched;
     }
   }
   ASSERT_GE(touched, 2);
   const AdjustmentResult result = adjust_network(scene.network, {});
   EXPECT_EQ(result.epoch_residuals[4].rejected, touched);
-  EXPECT_EQ(result.marker_residuals[2].rejected, touched);
+  EXPECT_EQ(result.feature_residuals[2].rejected, touched);
   EXPECT_LT(pose_errors(scene, result).rms_um, 2 * clean);
 }
 
@@ -233,18 +161,18 @@ TEST(Adjustment, MislabelledMarkerAndSingleBadCornerAreTakenOut) {
   options.noise_px = 0.01;
   ObservationScene scene = make_observation_scene(options);
   const double clean = pose_errors(scene, adjust_network(scene.network, {})).rms_um;
-  auto& first = scene.network.photos[7].markers;
+  auto& first = scene.network.photos[7].observations;
   ASSERT_GE(first.size(), 4U);
-  std::swap(first[0].corners_px, first[1].corners_px);
-  auto& other = scene.network.photos[20].markers[fixed_observation(scene, 20)];
-  other.corners_px[2] += Eigen::Vector2d(0.5, -0.4);
+  std::swap(first[0].px, first[1].px);
+  auto& other = scene.network.photos[20].observations[fixed_observation(scene, 20)];
+  other.px.segment<2>(4) += Eigen::Vector2d(0.5, -0.4);
   const AdjustmentResult result = adjust_network(scene.network, {});
   EXPECT_EQ(result.photo_residuals[7].rejected, 2);
   EXPECT_EQ(result.photo_residuals[20].rejected, 0);
   int without_corner = 0;
   for (const Sighting& sighting : result.sightings) {
     if (sighting.photo == 20 && sighting.rows == 6) {
-      EXPECT_FALSE(sighting.corner_used[2]);
+      EXPECT_FALSE(sighting.point_used[2]);
       ++without_corner;
     }
   }
@@ -256,19 +184,18 @@ TEST(Adjustment, DisconnectedPhotographIsNamedAndTheRestGoesOn) {
   ObservationSceneOptions options;
   options.noise_px = 0.01;
   ObservationScene scene = make_observation_scene(options);
-  scene.network.photos[9].markers.clear();
+  scene.network.photos[9].observations.clear();
   for (std::size_t p :
        {std::size_t{15}, std::size_t{16}, std::size_t{17}}) {  // epoch 5 sees the moving grip only
-    std::erase_if(scene.network.photos[p].markers,
-                  [](const MarkerObservation& seen) { return seen.id < 100; });
+    std::erase_if(scene.network.photos[p].observations,
+                  [](const Observation& seen) { return seen.id < 100; });
   }
-  std::erase_if(scene.network.photos[18].markers,
-                [](const MarkerObservation& seen) { return seen.id < 100; });
+  std::erase_if(scene.network.photos[18].observations, [](const Observation& seen) { return seen.id < 100; });
   const AdjustmentResult result = adjust_network(scene.network, {});
   ASSERT_EQ(result.status, AdjustmentStatus::ok) << result.reason;
   EXPECT_FALSE(result.geometry.has_photo[9]);
   EXPECT_FALSE(result.geometry.has_photo[15]);
-  EXPECT_FALSE(result.geometry.has_epoch[5]);
+  EXPECT_FALSE(result.geometry.has_pose[kMovingBody][5]);
   EXPECT_TRUE(result.geometry.has_photo[18]);  // held by the moving grip, whose pose the other two give
   EXPECT_LT(pose_errors(scene, result).rms_um, 2.0);
 }
@@ -279,7 +206,7 @@ TEST(Adjustment, MarkerSeenOnceIsNotUsed) {
   ObservationScene scene = make_observation_scene(options);
   bool kept = false;
   for (NetworkPhoto& photo : scene.network.photos) {
-    std::erase_if(photo.markers, [&](const MarkerObservation& seen) {
+    std::erase_if(photo.observations, [&](const Observation& seen) {
       if (seen.id != 102) return false;
       const bool erase = kept;
       kept = true;
@@ -288,7 +215,7 @@ TEST(Adjustment, MarkerSeenOnceIsNotUsed) {
   }
   const AdjustmentResult result = adjust_network(scene.network, {});
   ASSERT_EQ(result.status, AdjustmentStatus::ok);
-  EXPECT_FALSE(result.geometry.has_marker[12]);
+  EXPECT_FALSE(result.geometry.has_feature[12]);
   EXPECT_EQ(std::count_if(result.sightings.begin(), result.sightings.end(),
                           [](const Sighting& s) { return s.status == SightingStatus::seen_once; }),
             1);
@@ -296,7 +223,7 @@ TEST(Adjustment, MarkerSeenOnceIsNotUsed) {
 
 TEST(Adjustment, RefusesWhenNothingIsConnected) {
   ObservationScene scene = make_observation_scene({.num_epochs = 2});
-  for (NetworkPhoto& photo : scene.network.photos) photo.markers.clear();
+  for (NetworkPhoto& photo : scene.network.photos) photo.observations.clear();
   const AdjustmentResult result = adjust_network(scene.network, {});
   EXPECT_EQ(result.status, AdjustmentStatus::nothing_connected);
   EXPECT_FALSE(result.reason.empty());
@@ -311,7 +238,7 @@ TEST(Adjustment, ASingleMarkerInTwoPhotographsIsEnoughUnlessItsShapeIsFree) {
     options.interior_sigma = calibrated ? 1 : 0;
     ObservationScene scene = make_observation_scene(options);
     for (NetworkPhoto& photo : scene.network.photos)
-      std::erase_if(photo.markers, [](const MarkerObservation& m) { return m.id != 2; });
+      std::erase_if(photo.observations, [](const Observation& m) { return m.id != 2; });
     for (const auto interior : {AdjustmentOptions::Interior::refined, AdjustmentOptions::Interior::fixed}) {
       AdjustmentOptions how;
       how.interior = interior;
@@ -323,8 +250,8 @@ TEST(Adjustment, ASingleMarkerInTwoPhotographsIsEnoughUnlessItsShapeIsFree) {
   options.interior_sigma = 0;
   ObservationScene scene = make_observation_scene(options);
   for (NetworkPhoto& photo : scene.network.photos)
-    std::erase_if(photo.markers, [](const MarkerObservation& m) { return m.id != 2; });
-  scene.network.photos[0].markers.at(0).corners_px[1] += Eigen::Vector2d(30, 10);
+    std::erase_if(photo.observations, [](const Observation& m) { return m.id != 2; });
+  scene.network.photos[0].observations.at(0).px.segment<2>(2) += Eigen::Vector2d(30, 10);
   AdjustmentOptions free_shape;
   free_shape.shape = AdjustmentOptions::Shape::free;
   const AdjustmentResult result = adjust_network(scene.network, free_shape);
@@ -397,7 +324,7 @@ TEST(MarkerMap, AMovedMarkerIsLeftOutOfItsEpochAlone) {
   int moved = 0;
   for (NetworkPhoto& photo : scene.network.photos) {
     if (photo.epoch != 9) continue;
-    for (Eigen::Vector2d& corner : photo.markers[0].corners_px) corner.x() += 2;
+    for (int c = 0; c < 4; ++c) photo.observations[0].px[2 * c] += 2;
     ++moved;
   }
   const AdjustmentResult result = adjust_network_by_map(scene.network, first_epochs(6), {});
@@ -429,7 +356,8 @@ TEST(Adjustment, SameInputGivesTheSameBits) {
   const AdjustmentResult a = adjust_network(scene.network, {});
   const AdjustmentResult b = adjust_network(scene.network, {});
   for (std::size_t e = 0; e < 4; ++e) {
-    EXPECT_EQ(a.geometry.fixed_from_moving[e].matrix(), b.geometry.fixed_from_moving[e].matrix());
+    EXPECT_EQ(a.geometry.reference_from_body[kMovingBody][e].matrix(),
+              b.geometry.reference_from_body[kMovingBody][e].matrix());
   }
 }
 

@@ -34,18 +34,17 @@ void expect_sane(const AdjustmentResult& result) {
   EXPECT_TRUE(std::isfinite(result.redundancy_total));
   EXPECT_TRUE(std::isfinite(result.interior_chi2));
   if (result.status == AdjustmentStatus::nothing_connected) return;
-  EXPECT_TRUE(result.common_covariance.allFinite());
-  for (std::size_t e = 0; e < result.geometry.has_epoch.size(); ++e) {
-    if (!result.geometry.has_epoch[e]) continue;
-    EXPECT_TRUE(result.geometry.fixed_from_moving[e].translation.allFinite());
-    EXPECT_TRUE(result.geometry.fixed_from_moving[e].rotation.coeffs().allFinite());
-    const Matrix6d covariance = epoch_covariance(result, static_cast<int>(e), static_cast<int>(e));
+  for (std::size_t e = 0; e < result.geometry.has_pose[kMovingBody].size(); ++e) {
+    if (!result.geometry.has_pose[kMovingBody][e]) continue;
+    EXPECT_TRUE(result.geometry.reference_from_body[kMovingBody][e].translation.allFinite());
+    EXPECT_TRUE(result.geometry.reference_from_body[kMovingBody][e].rotation.coeffs().allFinite());
+    const Matrix6d covariance = result.pose_covariance(static_cast<int>(e), static_cast<int>(e));
     EXPECT_TRUE(covariance.allFinite());
     EXPECT_GE(covariance.diagonal().minCoeff(), 0) << "epoch " << e;
   }
   for (std::size_t p = 0; p < result.geometry.has_photo.size(); ++p) {
     if (!result.geometry.has_photo[p]) continue;
-    EXPECT_TRUE(result.geometry.camera_from_fixed[p].translation.allFinite());
+    EXPECT_TRUE(result.geometry.camera_from_reference[p].translation.allFinite());
   }
   for (const Vector8d& residual : result.residuals_px) EXPECT_TRUE(residual.allFinite());
   for (const double redundancy : result.redundancy) EXPECT_TRUE(std::isfinite(redundancy));
@@ -57,18 +56,24 @@ struct Torture {
   bool harmless;  // one marker of one photograph: the rest is as if it had not been there
 };
 
-MarkerObservation& victim(Network& network) { return network.photos[4].markers[2]; }
+Observation& victim(Network& network) { return network.photos[4].observations[2]; }
+
+void scale_drawing(NetworkFeature& feature, double factor) {
+  feature.drawn_mm *= factor;
+  for (ShapeMode& mode : feature.modes) mode.displacement_mm *= factor;
+}
 
 const std::vector<Torture>& tortures() {
   static const std::vector<Torture> all{
-      {"NanCorner", [](Network& n) { victim(n).corners_px[1].x() = kNan; }, true},
-      {"InfiniteCorner", [](Network& n) { victim(n).corners_px[1].y() = kInfinity; }, true},
-      {"FarCorner", [](Network& n) { victim(n).corners_px[3] *= 1e12; }, true},
-      {"AllCornersTheSame", [](Network& n) { victim(n).corners_px.fill(victim(n).corners_px[0]); }, true},
+      {"NanCorner", [](Network& n) { victim(n).px[2] = kNan; }, true},
+      {"InfiniteCorner", [](Network& n) { victim(n).px[3] = kInfinity; }, true},
+      {"FarCorner", [](Network& n) { victim(n).px.tail<2>() *= 1e12; }, true},
+      {"AllCornersTheSame",
+       [](Network& n) { victim(n).px = victim(n).px.head<2>().replicate<4, 1>().eval(); }, true},
       {"CollinearCorners",
        [](Network& n) {
-         auto& c = victim(n).corners_px;
-         for (std::size_t i = 1; i < 4; ++i) c[i] = c[0] + static_cast<double>(i) * Eigen::Vector2d(30, 20);
+         auto& px = victim(n).px;
+         for (int i = 1; i < 4; ++i) px.segment<2>(2 * i) = px.head<2>() + i * Eigen::Vector2d(30, 20);
        },
        true},
       {"NanCovariance", [](Network& n) { victim(n).covariance_px2(3, 3) = kNan; }, true},
@@ -78,7 +83,7 @@ const std::vector<Torture>& tortures() {
       {"UnknownId", [](Network& n) { victim(n).id = 577; }, true},
       {"NoMarkersAtAll",
        [](Network& n) {
-         for (NetworkPhoto& photo : n.photos) photo.markers.clear();
+         for (NetworkPhoto& photo : n.photos) photo.observations.clear();
        },
        false},
       {"OnePhotograph", [](Network& n) { n.photos.resize(1); }, false},
@@ -98,20 +103,20 @@ const std::vector<Torture>& tortures() {
        false},
       {"TheSamePhotographInEveryEpoch",
        [](Network& n) {
-         for (NetworkPhoto& photo : n.photos) photo.markers = n.photos[0].markers;
+         for (NetworkPhoto& photo : n.photos) photo.observations = n.photos[0].observations;
        },
        false},
       {"SizesInMetres",
        [](Network& n) {
-         for (NetworkMarker& marker : n.markers) marker.size_mm /= 1000;
+         for (NetworkFeature& feature : n.features) scale_drawing(feature, 1e-3);
        },
        false},
       {"SizesInMicrometres",
        [](Network& n) {
-         for (NetworkMarker& marker : n.markers) marker.size_mm *= 1000;
+         for (NetworkFeature& feature : n.features) scale_drawing(feature, 1e3);
        },
        false},
-      {"OneSizeAThousandTimesTooLarge", [](Network& n) { n.markers[3].size_mm *= 1000; }, false},
+      {"OneSizeAThousandTimesTooLarge", [](Network& n) { scale_drawing(n.features[3], 1e3); }, false},
       {"FocalLengthAThousandTimesTooLong", [](Network& n) { n.cameras[0].model.parameters[0] *= 1000; },
        false},
       {"FocalLengthAThousandTimesTooShort", [](Network& n) { n.cameras[0].model.parameters[0] /= 1000; },
@@ -119,13 +124,13 @@ const std::vector<Torture>& tortures() {
       {"CovariancesAMillionTimesTooSmall",
        [](Network& n) {
          for (NetworkPhoto& photo : n.photos)
-           for (MarkerObservation& seen : photo.markers) seen.covariance_px2 *= 1e-6;
+           for (Observation& seen : photo.observations) seen.covariance_px2 *= 1e-6;
        },
        false},
       {"EveryMarkerTheSameId",
        [](Network& n) {
          for (NetworkPhoto& photo : n.photos)
-           for (MarkerObservation& seen : photo.markers) seen.id = 0;
+           for (Observation& seen : photo.observations) seen.id = 0;
        },
        false},
   };

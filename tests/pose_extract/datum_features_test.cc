@@ -36,20 +36,20 @@ ObservationScene twelve_sided_grip(const GripOptions& options) {
     Eigen::Matrix3d r;
     r << Eigen::Vector3d::UnitZ().cross(outward), Eigen::Vector3d::UnitZ(), outward;
     scene.body_from_marker.emplace_back(r, Eigen::Vector3d(60 * outward + Eigen::Vector3d(0, 0, -20)));
-    scene.network.markers.push_back({i, Body::fixed, 20});
+    (void)scene.network.add_square(i, kReferenceBody, 20);
   }
   for (int i = 0; i < 6; ++i) {
     const double azimuth = 60.0 * i * kRadPerDeg;
     scene.body_from_marker.push_back(
         Rigid3::from_translation({35 * std::cos(azimuth), 35 * std::sin(azimuth), 0}));
-    scene.network.markers.push_back({12 + i, Body::fixed, 20});
+    (void)scene.network.add_square(12 + i, kReferenceBody, 20);
   }
   std::mt19937_64 rng(5);
   std::normal_distribution<double> unit(0.0, 1.0);
   const auto normal = [&](std::mt19937_64& random) { return options.noise_px * unit(random); };
-  for (std::size_t m = 0; m < scene.network.markers.size(); ++m) {
+  for (std::size_t m = 0; m < scene.network.features.size(); ++m) {
     const Eigen::Vector3d shift(options.glued_mm * unit(rng), options.glued_mm * unit(rng),
-                                scene.network.markers[m].id == options.lifted ? 0.1 : 0);
+                                scene.network.features[m].id == options.lifted ? 0.1 : 0);
     const Eigen::Vector3d turn(0, 0, options.glued_deg * kRadPerDeg * unit(rng));
     scene.body_from_marker[m] =
         scene.body_from_marker[m] * Rigid3(quaternion_from_rotation_vector(turn), shift);
@@ -63,24 +63,20 @@ ObservationScene twelve_sided_grip(const GripOptions& options) {
     r.col(1) = r.col(2).cross(r.col(0));
     const Rigid3 camera_from_fixed = inverse(Rigid3(r, eye));
     NetworkPhoto photo;
-    for (std::size_t m = 0; m < scene.network.markers.size(); ++m) {
+    for (std::size_t m = 0; m < scene.network.features.size(); ++m) {
       const Rigid3 seen_from = camera_from_fixed * scene.body_from_marker[m];
       if (-seen_from.rotation_matrix().col(2).dot(seen_from.translation.normalized()) < 0.35) continue;
-      MarkerObservation seen;
+      Observation seen;
       Vector8d px;
-      if (!project_marker({scene.true_camera, camera_from_fixed, nullptr, scene.body_from_marker[m]}, 20, 0,
-                          SquareShape::Zero(), px, nullptr)) {
+      if (!project_drawn({scene.true_camera, camera_from_fixed, nullptr, scene.body_from_marker[m]},
+                         scene.network.features[m], px, nullptr)) {
         continue;
       }
-      seen.id = scene.network.markers[m].id;
-      seen.status = MarkerStatus::ok;
-      seen.covariance_px2 *= 1e-4;
-      seen.side_px = 250;
-      for (int c = 0; c < 4; ++c) {
-        seen.corners_px[static_cast<std::size_t>(c)] =
-            px.segment<2>(2 * c) + Eigen::Vector2d(normal(rng), normal(rng));
-      }
-      photo.markers.push_back(seen);
+      seen.id = scene.network.features[m].id;
+      seen.covariance_px2 = 1e-4 * Matrix8d::Identity();
+      seen.px = px;
+      for (int i = 0; i < 8; ++i) seen.px[i] += normal(rng);
+      photo.observations.push_back(seen);
     }
     scene.network.photos.push_back(photo);
   }
@@ -105,11 +101,11 @@ void expect_axis_and_end_plate(const GripOptions& options) {
   features.x.kind = Feature::Kind::line;
   features.x.points = {{15, -1}, {12, -1}};
   features.origin = feature(Feature::Kind::plane, 12, 17);  // where the axis meets the end plate
-  const DatumFrame frame = frame_from_features(scene.network, adjusted, Body::fixed, features);
+  const DatumFrame frame = frame_from_features(scene.network, adjusted, kReferenceBody, features);
   ASSERT_TRUE(frame.ok) << frame.reason;
   // The grip's own frame, up to the turn about z that the line sets.
   const Rigid3 frame_from_true =
-      frame.frame_from_body * adjusted.geometry.body_from_marker[0] * inverse(scene.body_from_marker[0]);
+      frame.frame_from_body * adjusted.geometry.body_from_feature[0] * inverse(scene.body_from_marker[0]);
   EXPECT_LT(frame_from_true.translation.norm(), 0.010);
   const double tilt = std::acos(std::min(1.0, frame_from_true.rotation_matrix()(2, 2)));
   EXPECT_LT(tilt * kDegPerRad, 0.01);
@@ -121,8 +117,7 @@ void expect_axis_and_end_plate(const GripOptions& options) {
                           [](const std::string& note) { return note.find("lifted") != std::string::npos; }),
             options.lifted >= 0 ? 1 : 0);
   // The stated covariance explains the error of the origin.
-  const Eigen::Matrix3d covariance =
-      (frame.by_common * adjusted.common_covariance * frame.by_common.transpose()).topLeftCorner<3, 3>();
+  const Eigen::Matrix3d covariance = (frame.by_error * frame.by_error.transpose()).topLeftCorner<3, 3>();
   EXPECT_GT(covariance.trace(), 0);
 }
 
@@ -141,7 +136,7 @@ TEST(DatumFeatures, ParallelDirectionsAreRefused) {
   features.z = feature(Feature::Kind::plane, 12, 17);
   features.x = feature(Feature::Kind::cylinder, 0, 11);
   features.origin = feature(Feature::Kind::point, 12, 12);
-  const DatumFrame frame = frame_from_features(scene.network, adjusted, Body::fixed, features);
+  const DatumFrame frame = frame_from_features(scene.network, adjusted, kReferenceBody, features);
   EXPECT_FALSE(frame.ok);
   EXPECT_THAT(frame.reason, HasSubstr("parallel"));
 }
@@ -157,7 +152,7 @@ TEST(DatumFeatures, SayWhichFeatureIsTooWeakForAFrame) {
   const auto expect = [&](const std::string& words, auto change) {
     FeatureFrame features = good;
     change(features);
-    const DatumFrame frame = frame_from_features(scene.network, adjusted, Body::fixed, features);
+    const DatumFrame frame = frame_from_features(scene.network, adjusted, kReferenceBody, features);
     EXPECT_EQ(frame.ok, words.empty()) << words;
     EXPECT_THAT(frame.reason, HasSubstr(words));
   };
@@ -169,9 +164,9 @@ TEST(DatumFeatures, SayWhichFeatureIsTooWeakForAFrame) {
   expect("z and x must be a plane, line, circle or cylinder: a point or sphere has no direction",
          [](auto& f) { f.x = feature(Feature::Kind::point, 13, 13); });
   // A line so steep on the plane that a last digit decides whether z and x are parallel: no derivative.
-  const Rigid3& from = adjusted.geometry.body_from_marker[13];
+  const Rigid3& from = adjusted.geometry.body_from_feature[13];
   const double steep = 10 * kRadPerDeg + 1e-8;
-  adjusted.geometry.body_from_marker[0].translation =
+  adjusted.geometry.body_from_feature[0].translation =
       from.translation + from.rotation * Eigen::Vector3d(100 * std::sin(steep), 0, 100 * std::cos(steep));
   expect("its features are too weak to construct it", [](auto& f) { f.x.points = {{13, -1}, {0, -1}}; });
 }
@@ -194,7 +189,7 @@ std::vector<NominalPoint> nominal_centres(const ObservationScene& scene,
   std::vector<NominalPoint> nominal;
   for (std::size_t m = 0; m < sigma_mm.size(); ++m)
     nominal.push_back(
-        {{scene.network.markers[m].id, -1}, scene.body_from_marker[m].translation, sigma_mm[m]});
+        {{scene.network.features[m].id, -1}, scene.body_from_marker[m].translation, sigma_mm[m]});
   return nominal;
 }
 
@@ -204,7 +199,8 @@ TEST(DatumNominal, SaysWhyItsPointsMakeNoFrame) {
   ASSERT_EQ(adjusted.status, AdjustmentStatus::ok) << adjusted.reason;
   const auto expect = [&](const std::string& words, const std::vector<NominalPoint>& nominal) {
     for (const bool with_scale : {false, true}) {
-      const DatumFrame frame = frame_from_nominal(scene.network, adjusted, Body::fixed, nominal, with_scale);
+      const DatumFrame frame =
+          frame_from_nominal(scene.network, adjusted, kReferenceBody, nominal, with_scale);
       EXPECT_EQ(frame.ok, words.empty()) << words;
       EXPECT_EQ(frame.reason, words);
     }
@@ -219,8 +215,8 @@ TEST(DatumNominal, SaysWhyItsPointsMakeNoFrame) {
   expect("fewer than 3 of its nominal points agree with the measurement", nominal);
   // Markers 0 to 3 in a row along the grip, as good as; the turn about it is left open.
   for (std::size_t m = 0; m < 4; ++m) {
-    adjusted.geometry.body_from_marker[m].translation =
-        adjusted.geometry.body_from_marker[12].translation +
+    adjusted.geometry.body_from_feature[m].translation =
+        adjusted.geometry.body_from_feature[12].translation +
         Eigen::Vector3d(12.3, 7.7, -3.1) * static_cast<double>(m) + Eigen::Vector3d(0, m == 1 ? 1e-3 : 0, 0);
   }
   nominal = nominal_centres(scene, {0.01, 0.01, 0.01, 0.01});
@@ -236,8 +232,8 @@ TEST(DatumNominal, SaysWhyItsPointsMakeNoFrame) {
 TEST(DatumFrames, OfABodyWithoutAMeasuredMarkerIsNone) {
   const ObservationScene scene = twelve_sided_grip({});
   const AdjustmentResult adjusted = adjust_network(scene.network, {});
-  EXPECT_TRUE(frame_from_first_marker(scene.network, adjusted, Body::fixed).ok);
-  const DatumFrame frame = frame_from_first_marker(scene.network, adjusted, Body::moving);
+  EXPECT_TRUE(frame_from_first_marker(scene.network, adjusted, kReferenceBody).ok);
+  const DatumFrame frame = frame_from_first_marker(scene.network, adjusted, kMovingBody);
   EXPECT_FALSE(frame.ok);
   EXPECT_EQ(frame.reason, "none of its markers was measured");
 }

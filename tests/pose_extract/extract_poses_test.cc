@@ -53,9 +53,9 @@ class ExtractPoses : public ::testing::Test {
       if (marker.id < 100) continue;
       Vector8d px;
       ASSERT_TRUE(
-          project_marker({scene.true_camera, scene.camera_from_fixed[p], &scene.fixed_from_moving[epoch],
-                          scene.body_from_marker[static_cast<std::size_t>(marker.id) - 90]},
-                         24, 0, SquareShape::Zero(), px, nullptr));
+          project_drawn({scene.true_camera, scene.camera_from_fixed[p], &scene.fixed_from_moving[epoch],
+                         scene.body_from_marker[static_cast<std::size_t>(marker.id) - 90]},
+                        scene.network.features[0], px, nullptr));
       for (int c = 0; c < 4; ++c) marker.corners_px[static_cast<std::size_t>(c)] = px.segment<2>(2 * c);
     }
   }
@@ -258,8 +258,8 @@ TEST_F(ExtractPoses, MovedFixedMarkerIsNamed) {
     for (MarkerObservation& marker : made_.observations.photographs[p].seen.markers) {
       if (marker.id != 2) continue;
       Vector8d px;
-      ASSERT_TRUE(project_marker({made_.scene.true_camera, made_.scene.camera_from_fixed[p], nullptr, moved},
-                                 24, 0, SquareShape::Zero(), px, nullptr));
+      ASSERT_TRUE(project_drawn({made_.scene.true_camera, made_.scene.camera_from_fixed[p], nullptr, moved},
+                                made_.scene.network.features[2], px, nullptr));
       for (int c = 0; c < 4; ++c) marker.corners_px[static_cast<std::size_t>(c)] = px.segment<2>(2 * c);
     }
   }
@@ -411,9 +411,9 @@ TEST_F(ExtractPoses, APoseInWhichMostMovingMarkersMovedContradicts) {
       const Rigid3 moved = made_.scene.body_from_marker[static_cast<std::size_t>(marker.id) - 90] *
                            Rigid3::from_translation({std::cos(way), std::sin(way), 0});
       Vector8d px;
-      ASSERT_TRUE(project_marker({made_.scene.true_camera, made_.scene.camera_from_fixed[p],
-                                  &made_.scene.fixed_from_moving[2], moved},
-                                 24, 0, SquareShape::Zero(), px, nullptr));
+      ASSERT_TRUE(project_drawn({made_.scene.true_camera, made_.scene.camera_from_fixed[p],
+                                 &made_.scene.fixed_from_moving[2], moved},
+                                made_.scene.network.features[0], px, nullptr));
       for (int c = 0; c < 4; ++c) marker.corners_px[static_cast<std::size_t>(c)] = px.segment<2>(2 * c);
     }
   }
@@ -631,10 +631,10 @@ TEST_F(ExtractPoses, LgFromNominalCoordinates) {
   for (std::size_t m = 10; m < 20; ++m) {
     for (int c = 0; c < 4; ++c) {
       // LG is the moving body's own frame shifted by a millimetre.
-      lg.nominal.push_back({{made_.scene.network.markers[m].id, c},
-                            made_.scene.body_from_marker[m] * corner_in_marker(c, 24, SquareShape::Zero()) +
-                                Eigen::Vector3d(1, 0, 0),
-                            0.001});
+      lg.nominal.push_back(
+          {{made_.scene.network.features[m].id, c},
+           made_.scene.body_from_marker[m] * made_.scene.printed_points(m).col(c) + Eigen::Vector3d(1, 0, 0),
+           0.001});
     }
   }
   made_.campaign.lg = lg;

@@ -15,6 +15,17 @@ struct CampaignScene {
   CampaignObservations observations;
 };
 
+/// An observation of a square as a detector gives it.
+inline MarkerObservation marker_of(const Observation& seen) {
+  MarkerObservation marker;
+  marker.id = seen.id;
+  marker.status = MarkerStatus::ok;
+  for (int c = 0; c < 4; ++c) marker.corners_px[static_cast<std::size_t>(c)] = seen.px.segment<2>(2 * c);
+  marker.covariance_px2 = seen.covariance_px2;
+  marker.side_px = (marker.corners_px[1] - marker.corners_px[0]).norm();
+  return marker;
+}
+
 inline CampaignScene make_campaign_scene(const ObservationSceneOptions& options) {
   CampaignScene made;
   made.scene = make_observation_scene(options);
@@ -22,16 +33,13 @@ inline CampaignScene make_campaign_scene(const ObservationSceneOptions& options)
   campaign.file = "campaign.yaml";
   campaign.family = "tag36h11";
   FrameRule ug;
-  for (std::size_t m = 0; m < made.scene.network.markers.size(); ++m) {
-    const NetworkMarker& marker = made.scene.network.markers[m];
-    (marker.body == Body::fixed ? campaign.fixed : campaign.moving)[marker.id] = marker.size_mm;
-    if (marker.body != Body::fixed) continue;
+  for (std::size_t m = 0; m < made.scene.network.features.size(); ++m) {
+    const NetworkFeature& marker = made.scene.network.features[m];
+    (marker.body == kReferenceBody ? campaign.fixed : campaign.moving)[marker.id] = square_edge_mm(marker);
+    if (marker.body != kReferenceBody) continue;
     for (int c = 0; c < 4; ++c) {
       ug.nominal.push_back(
-          {{marker.id, c},
-           made.scene.body_from_marker[m] *
-               corner_in_marker(c, marker.size_mm * (1 + options.print_scale), made.scene.shape_mm[m]),
-           0.001});
+          {{marker.id, c}, made.scene.body_from_marker[m] * made.scene.printed_points(m).col(c), 0.001});
     }
   }
   campaign.ug = ug;
@@ -61,7 +69,7 @@ inline CampaignScene make_campaign_scene(const ObservationSceneOptions& options)
     photograph.seen.info.width_px = camera.model.width_px;
     photograph.seen.info.height_px = camera.model.height_px;
     photograph.seen.info.focal_length_mm = 35;
-    photograph.seen.markers = photo.markers;
+    for (const Observation& seen : photo.observations) photograph.seen.markers.push_back(marker_of(seen));
     made.observations.photographs.push_back(photograph);
   }
   return made;

@@ -7,7 +7,7 @@
 #include "kinematics/geometry/covariance.h"
 #include "kinematics/geometry/pose.h"
 #include "photogrammetry/adjustment/network.h"
-#include "photogrammetry/adjustment/sighting.h"
+#include "photogrammetry/adjustment/projection.h"
 
 namespace hexcal {
 
@@ -17,12 +17,17 @@ struct ObservationSceneOptions {
   int num_epochs = 13;
   int stations = 3;
   int markers_per_body = 10;
+  int points_per_body = 0;  ///< single points beside the markers
+  int moving_bodies = 1;    ///< 2: another grip, below the first, with poses of its own
+  bool fixed_stations =
+      false;  ///< every pose is photographed from the same stations, and the network knows it
   double size_mm = 24;
   double noise_px = 0;         ///< standard deviation of a corner coordinate
   double stated_noise_px = 0;  ///< what the covariances claim; 0: noise_px, or 0.01 px without noise
   double interior_sigma =
       0;  ///< 1: the camera given differs from the true one by the calibration's covariance
   double shape_sigma_mm = 0;  ///< squareness and flatness of the printed markers
+  double size_sigma = 0;      ///< relative, of each printed marker's own size
   double print_scale = 0;
   unsigned seed = 1;
 };
@@ -31,7 +36,17 @@ struct ObservationScene {
   Network network;
   CameraModel true_camera;
   std::vector<Rigid3> fixed_from_moving, camera_from_fixed, body_from_marker;
-  std::vector<SquareShape> shape_mm;
+  std::vector<Rigid3> fixed_from_second;  ///< of a second moving body
+  double print_scale = 0;
+  Eigen::VectorXd shape;  ///< per shape parameter of the network
+
+  /// True points of a feature in its own frame.
+  [[nodiscard]] DrawnPoints printed_points(std::size_t feature) const {
+    NetworkGeometry truth;
+    truth.shape = shape;
+    truth.print_scale = print_scale;
+    return hexcal::printed_points(network.features[feature], truth);
+  }
 };
 
 /// A calibration's covariance of typical size with f and k correlated.
@@ -55,6 +70,7 @@ inline ObservationScene make_observation_scene(const ObservationSceneOptions& op
     return v;
   };
   ObservationScene scene;
+  scene.print_scale = options.print_scale;
   CameraModel camera(6016, 4000, 9011.0);
   camera.parameters.tail<5>() << 0.03, -0.05, 1e-4, -2e-4, 0.1;
   camera.parameters[2] += 13;
@@ -70,9 +86,10 @@ inline ObservationScene make_observation_scene(const ObservationSceneOptions& op
   scene.network.cameras.push_back(given);
   scene.network.num_epochs = options.num_epochs;
 
-  // Faces around the front half of two drums, the fixed one above the moving one; z up, cameras at +x.
-  for (int body = 0; body < 2; ++body) {
-    for (int i = 0; i < options.markers_per_body; ++i) {
+  // Faces around the front half of drums, the fixed one above the moving ones; z up, cameras at +x.
+  scene.network.num_bodies = 1 + options.moving_bodies;
+  for (int body = 0; body < scene.network.num_bodies; ++body) {
+    for (int i = 0; i < options.markers_per_body + options.points_per_body; ++i) {
       const int column = i % 5;
       const double azimuth = (column - 2) * 28.0 * kRadPerDeg;
       const double tilt = (i % 3 - 1) * 12.0 * kRadPerDeg;
@@ -83,17 +100,25 @@ inline ObservationScene make_observation_scene(const ObservationSceneOptions& op
       r.col(0) = up.cross(outward).normalized();
       r.col(2) = outward;
       r.col(1) = outward.cross(r.col(0));
-      const double height = (body == 0 ? 1 : -1) * (35.0 + 30.0 * (i / 5)) + (body == 0 ? 0 : 50);
-      const Eigen::Vector3d at(60 * outward.x(), 60 * outward.y(), height);
+      const double height = (body == 0 ? 1 : -1) * (35.0 + 30.0 * (i / 5 % 2)) + (body == 0 ? 0 : 50);
+      Eigen::Vector3d at(60 * outward.x(), 60 * outward.y(), height);
       Vector6d jitter;
       jitter << 1.5 * normals(3), 0.03 * normals(3);
+      if (i >= options.markers_per_body) at += 8 * Eigen::Vector3d(uniform(rng), uniform(rng), uniform(rng));
       scene.body_from_marker.push_back(perturbed(Rigid3(r, at), jitter));
-      SquareShape shape = options.shape_sigma_mm * normals(6);
-      scene.shape_mm.push_back(shape);
-      scene.network.markers.push_back(
-          {body == 0 ? i : 100 + i, body == 0 ? Body::fixed : Body::moving, options.size_mm});
+      const int id = 100 * body + i;
+      if (i >= options.markers_per_body) {
+        (void)scene.network.add_point(id, body);
+        continue;
+      }
+      Eigen::VectorXd shape = options.shape_sigma_mm / (0.5 * options.size_mm) * normals(kSquareModes);
+      if (options.size_sigma > 0) shape[kSquareSize] += options.size_sigma * normal(rng);
+      scene.shape.conservativeResize(scene.shape.size() + kSquareModes);
+      scene.shape.tail<kSquareModes>() = shape;
+      (void)scene.network.add_square(id, body, options.size_mm);
     }
   }
+  if (options.fixed_stations) scene.network.stations.resize(static_cast<std::size_t>(options.stations));
   for (int e = 0; e < options.num_epochs; ++e) {
     Pose pose;
     if (e > 0) {
@@ -101,6 +126,12 @@ inline ObservationScene make_observation_scene(const ObservationSceneOptions& op
       pose.rpy_rad = 5 * kRadPerDeg * Eigen::Vector3d(uniform(rng), uniform(rng), uniform(rng));
     }
     scene.fixed_from_moving.push_back(ug_from_lg(pose, 50.0));
+    if (options.moving_bodies > 1) {
+      const Rigid3 below(
+          quaternion_from_rotation_vector(0.1 * Eigen::Vector3d(uniform(rng), uniform(rng), uniform(rng))),
+          Eigen::Vector3d(10 * uniform(rng), 10 * uniform(rng), -115 + 3 * uniform(rng)));
+      scene.fixed_from_second.push_back(below);
+    }
     for (int s = 0; s < options.stations; ++s) {
       const double azimuth = ((s % 3 - 1) * 30.0 + 3 * uniform(rng)) * kRadPerDeg;
       const double elevation = ((s % 2 == 0 ? 12.0 : -14.0) + 3 * uniform(rng)) * kRadPerDeg;
@@ -113,16 +144,21 @@ inline ObservationScene make_observation_scene(const ObservationSceneOptions& op
       fixed_camera.col(2) = (target - eye).normalized();
       fixed_camera.col(0) = fixed_camera.col(2).cross(Eigen::Vector3d::UnitZ()).normalized();
       fixed_camera.col(1) = fixed_camera.col(2).cross(fixed_camera.col(0));
-      const Rigid3 camera_from_fixed = inverse(Rigid3(
+      Rigid3 camera_from_fixed = inverse(Rigid3(
           fixed_camera * quaternion_from_rotation_vector({0, 0, 0.5 * uniform(rng)}).toRotationMatrix(),
           eye));
+      if (options.fixed_stations && e > 0)
+        camera_from_fixed = scene.camera_from_fixed[static_cast<std::size_t>(s)];
       scene.camera_from_fixed.push_back(camera_from_fixed);
       NetworkPhoto photo;
       photo.epoch = e;
-      for (std::size_t m = 0; m < scene.network.markers.size(); ++m) {
-        const NetworkMarker& marker = scene.network.markers[m];
-        const Rigid3* motion =
-            marker.body == Body::moving ? &scene.fixed_from_moving[static_cast<std::size_t>(e)] : nullptr;
+      if (options.fixed_stations) photo.station = s;
+      for (std::size_t m = 0; m < scene.network.features.size(); ++m) {
+        const NetworkFeature& marker = scene.network.features[m];
+        const auto epoch = static_cast<std::size_t>(e);
+        const Rigid3* motion = marker.body == kReferenceBody ? nullptr
+                               : marker.body == kMovingBody  ? &scene.fixed_from_moving[epoch]
+                                                             : &scene.fixed_from_second[epoch];
         const Rigid3 fixed_from_marker =
             motion != nullptr ? *motion * scene.body_from_marker[m] : scene.body_from_marker[m];
         const Rigid3 camera_from_marker = camera_from_fixed * fixed_from_marker;
@@ -130,23 +166,22 @@ inline ObservationScene make_observation_scene(const ObservationSceneOptions& op
             -camera_from_marker.rotation_matrix().col(2).dot(camera_from_marker.translation.normalized());
         Vector8d px;
         const bool visible =
-            project_marker({camera, camera_from_fixed, motion, scene.body_from_marker[m]}, marker.size_mm,
-                           options.print_scale, scene.shape_mm[m], px, nullptr);
+            project_feature({camera, camera_from_fixed, motion, scene.body_from_marker[m]}, marker,
+                            scene.printed_points(m), options.print_scale, px, nullptr);
         if (!visible || facing < 0.3) continue;
         bool inside = true;
-        for (int c = 0; c < 4; ++c) inside = inside && camera.contains(px.segment<2>(2 * c), 10);
+        const Eigen::Index rows = 2 * marker.points();
+        for (Eigen::Index i = 0; i < rows; i += 2) inside = inside && camera.contains(px.segment<2>(i), 10);
         if (!inside) continue;
-        MarkerObservation seen;
+        Observation seen;
         seen.id = marker.id;
-        seen.status = MarkerStatus::ok;
         const double stated = options.stated_noise_px > 0 ? options.stated_noise_px
                               : options.noise_px > 0      ? options.noise_px
                                                           : 0.01;
         px += options.noise_px * normals(8);
-        for (int c = 0; c < 4; ++c) seen.corners_px[static_cast<std::size_t>(c)] = px.segment<2>(2 * c);
-        seen.covariance_px2 *= stated * stated;
-        seen.side_px = (px.segment<2>(2) - px.segment<2>(0)).norm();
-        photo.markers.push_back(seen);
+        seen.px = px.head(rows);
+        seen.covariance_px2 = stated * stated * Eigen::MatrixXd::Identity(rows, rows);
+        photo.observations.push_back(seen);
       }
       scene.network.photos.push_back(photo);
     }

@@ -38,13 +38,13 @@ int run(int poses, int map_poses) {
   double variances = 0;
   const auto motion = [](const std::vector<Rigid3>& at, std::size_t e) { return at[0] * inverse(at[e]); };
   for (std::size_t e = 1; e < scene.fixed_from_moving.size(); ++e) {
-    const double found =
-        motion(result.geometry.fixed_from_moving, e).rotation.angularDistance(Eigen::Quaterniond::Identity());
+    const double found = motion(result.geometry.reference_from_body[kMovingBody], e)
+                             .rotation.angularDistance(Eigen::Quaterniond::Identity());
     const double truth =
         motion(scene.fixed_from_moving, e).rotation.angularDistance(Eigen::Quaterniond::Identity());
     squares += std::pow((found - truth) * kDegPerRad * 1e3, 2);
     variances +=
-        epoch_covariance(result, static_cast<int>(e), static_cast<int>(e)).topLeftCorner<3, 3>().trace();
+        result.pose_covariance(static_cast<int>(e), static_cast<int>(e)).topLeftCorner<3, 3>().trace();
   }
   const double count = poses - 1;
   fmt::print(

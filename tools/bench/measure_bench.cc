@@ -75,7 +75,7 @@ void adjust(benchmark::State& state) {
     const AdjustmentResult result = adjust_network(scene.network, {});
     if (result.status != AdjustmentStatus::ok) state.SkipWithError(result.reason.c_str());
     Matrix6d sum = Matrix6d::Zero();
-    for (int epoch = 0; epoch < options.num_epochs; ++epoch) sum += epoch_covariance(result, epoch, epoch);
+    for (int epoch = 0; epoch < options.num_epochs; ++epoch) sum += result.pose_covariance(epoch, epoch);
     benchmark::DoNotOptimize(sum);
   }
   state.counters["photographs"] = static_cast<double>(scene.network.photos.size());

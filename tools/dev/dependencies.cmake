@@ -19,6 +19,7 @@ endmacro()
 hexcal_find(Threads libc6-dev)
 hexcal_find(Eigen3 libeigen3-dev 3.4 NO_MODULE)
 hexcal_find(Ceres libceres-dev 2.1)
+hexcal_find(Boost libboost-dev 1.74)
 hexcal_find(OpenCV libopencv-dev 4.5 COMPONENTS core imgproc imgcodecs calib3d)
 set(HEXCAL_OPENCV_ARUCO aruco)  # where the ArUco dictionaries are
 if(OpenCV_VERSION VERSION_GREATER_EQUAL 4.7)

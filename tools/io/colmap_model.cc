@@ -81,13 +81,13 @@ class ColmapModel {
     for (const Sighting& sighting : result_.adjusted.sightings) {
       if (sighting.photo != static_cast<int>(p) || sighting.status != SightingStatus::used) continue;
       const bool moving =
-          result_.network.markers[static_cast<std::size_t>(sighting.marker)].body == Body::moving;
+          result_.network.features[static_cast<std::size_t>(sighting.feature)].body == kMovingBody;
       if (moving && !result_.poses[static_cast<std::size_t>(photo.epoch)].pose) continue;
       for (int corner = 0; corner < 4; ++corner) {
         const auto px = model_px(result_.adjusted.geometry.cameras[static_cast<std::size_t>(photo.camera)],
                                  sighting.px.segment<2>(2 * corner));
         if (!px) continue;
-        Track& track = tracks_[{sighting.marker, corner, moving ? photo.epoch : -1}];
+        Track& track = tracks_[{sighting.feature, corner, moving ? photo.epoch : -1}];
         if (track.places.empty()) track.number = tracks_.size();
         track.places.emplace_back(p + 1, index);
         lines += fmt::format("{}{:.6f} {:.6f} {}", index == 0 ? "" : " ", px->x(), px->y(), track.number);
@@ -101,7 +101,7 @@ class ColmapModel {
     const auto marker = static_cast<std::size_t>(point.marker);
     const auto measured =
         std::find_if(result_.points.begin(), result_.points.end(), [&](const MeasuredPoint& one) {
-          return one.point.id == result_.network.markers[marker].id && one.point.corner == point.corner;
+          return one.point.id == result_.network.features[marker].id && one.point.corner == point.corner;
         });
     if (measured == result_.points.end()) return "";
     Eigen::Vector3d at = measured->xyz_mm;
@@ -110,7 +110,7 @@ class ColmapModel {
     }
     std::string line = fmt::format("{} {:.9g} {:.9g} {:.9g} {} {:.6g}", track.number, at.x(), at.y(), at.z(),
                                    point.epoch >= 0 ? "210 110 40" : "60 100 200",
-                                   result_.adjusted.marker_residuals[marker].rms_px);
+                                   result_.adjusted.feature_residuals[marker].rms_px);
     for (const auto& [image, index] : track.places) line += fmt::format(" {} {}", image, index);
     return line + "\n";
   }

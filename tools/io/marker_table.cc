@@ -11,7 +11,7 @@ std::string format_marker_table(const std::string& head, const CampaignResult& r
   for (const MeasuredPoint& point : result.points) {
     const Eigen::Vector3d sigma = point.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
     out += fmt::format("{},{},{},{:.6f},{:.6f},{:.6f},{:.4g},{:.4g},{:.4g}\n", point.point.id,
-                       point.point.corner, point.body == Body::fixed ? "UG" : "LG", point.xyz_mm.x(),
+                       point.point.corner, point.body == kReferenceBody ? "UG" : "LG", point.xyz_mm.x(),
                        point.xyz_mm.y(), point.xyz_mm.z(), sigma.x(), sigma.y(), sigma.z());
   }
   return out;
@@ -36,7 +36,7 @@ std::string format_epoch_table(const std::string& head, const CampaignResult& re
     if (!pose.pose) continue;
     const Rigid3 UG_from_LG = ug_from_lg(*pose.pose, result.gd_mm);
     for (const MeasuredPoint& point : result.points) {
-      if (point.body != Body::moving) continue;
+      if (point.body != kMovingBody) continue;
       const Eigen::Vector3d at = UG_from_LG * point.xyz_mm;
       out += fmt::format("{},{},{},{:.6f},{:.6f},{:.6f}\n", csv_field(pose.id), point.point.id,
                          point.point.corner, at.x(), at.y(), at.z());

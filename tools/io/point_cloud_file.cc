@@ -15,7 +15,7 @@ std::vector<CloudPoint> corners_at_home(const CampaignResult& result) {
   const Rigid3 UG_from_LG = ug_from_lg(Pose(), result.gd_mm);
   std::vector<CloudPoint> cloud;
   for (const MeasuredPoint& point : result.points) {
-    if (point.body == Body::fixed) {
+    if (point.body == kReferenceBody) {
       cloud.push_back({point.xyz_mm, 60, 100, 200, point.point.id});
     } else {
       cloud.push_back({UG_from_LG * point.xyz_mm, 210, 110, 40, point.point.id});

@@ -108,9 +108,9 @@ std::string quality_text(const CampaignObservations& observations, const Campaig
                                    {"redundancy", photograph.residuals.redundancy}});
   }
   json["markers"] = Json::array();
-  for (std::size_t m = 0; m < adjusted.marker_residuals.size(); ++m) {
-    const ResidualSummary& residuals = adjusted.marker_residuals[m];
-    json["markers"].push_back({{"id", result.network.markers[m].id},
+  for (std::size_t m = 0; m < adjusted.feature_residuals.size(); ++m) {
+    const ResidualSummary& residuals = adjusted.feature_residuals[m];
+    json["markers"].push_back({{"id", result.network.features[m].id},
                                {"photographs", residuals.markers},
                                {"rejected", residuals.rejected},
                                {"rms_px", residuals.rms_px},

@@ -43,7 +43,7 @@ std::map<std::pair<int, int>, std::size_t> sightings_by_id(const CampaignResult&
   std::map<int, std::size_t> taken;  // by photograph: a sighting per marker, in their order
   for (std::size_t s = 0; s < sightings.size(); ++s) {
     const int photo = sightings[s].photo;
-    const auto& seen = result.network.photos[static_cast<std::size_t>(photo)].markers;
+    const auto& seen = result.network.photos[static_cast<std::size_t>(photo)].observations;
     out.emplace(std::pair(photo, seen.at(taken[photo]++).id), s);
   }
   return out;
