@@ -1,5 +1,7 @@
 #include "camera_calib/detect_sheets.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -15,6 +17,7 @@
 #include "camera_calib/initial_camera.h"
 #include "camera_calib/measure_point.h"
 #include "camera_calib/robust_fit.h"
+#include "camera_calib/sheet_image.h"
 #include "photogrammetry/markers/detect.h"
 #include "photogrammetry/markers/refine.h"
 
@@ -90,12 +93,49 @@ class PredictedSheet {
   SheetGeometry geometry_;
 };
 
-void measure_saddles(const cv::Mat& grey, ToneCurve tone, const PredictedSheet& predicted, int sheet,
-                     const Sheet& description, std::vector<FeatureObservation>& out) {
+// What a board's drawing says of its inner corners.
+class SaddleDrawing {
+ public:
+  explicit SaddleDrawing(const Sheet& sheet) : sheet_(sheet) {
+    if (sheet.kind != SheetKind::charuco) return;
+    const MarkerPattern& pattern =
+        marker_family(sheet.family).patterns[static_cast<std::size_t>(sheet.first_id)];
+    const int first = static_cast<int>(std::lround(0.5 * (pattern.cells - pattern.square_cells)));
+    // Only a marker with a black border has an edge that is the same all along.
+    if (pattern.white[static_cast<std::size_t>(first * pattern.cells + first)] != 0) return;
+    gap_ = 0.5 * (1 - sheet.marker_mm / sheet.pitch_mm);
+    border_ = sheet.marker_mm / pattern.square_cells / sheet.pitch_mm;
+  }
+
+  // From the pixels of the saddle and its neighbours to the right and below, in print.
+  [[nodiscard]] SaddleGuess guess(const SheetSaddle& saddle, const Eigen::Vector2d& px,
+                                  const Eigen::Vector2d& to_x_px, const Eigen::Vector2d& to_y_px) const {
+    const bool top_left_black = ((saddle.column + saddle.row) % 2 == 0) != sheet_.top_left_white;
+    return {px, to_x_px, to_y_px, gap_, border_, !top_left_black};
+  }
+
+ private:
+  const Sheet& sheet_;
+  double gap_ = 0, border_ = 0;
+};
+
+// At the places that a camera's view predicts. What was measured at the detection stays: no lens changes it.
+void measure_saddles(const cv::Mat& grey, ToneCurve tone, const PredictedSheet& predicted,
+                     const SheetView& view, const Sheet& description, std::vector<FeatureObservation>& out) {
+  const SaddleDrawing drawing(description);
   const int first = predicted.first_saddle();
-  const int count = static_cast<int>(predicted.geometry().saddles.size());
-  for (int i = 0; i < count; ++i) {
-    const Eigen::Vector3d& point = predicted.points_mm()[static_cast<std::size_t>(first + i)];
+  const std::vector<SheetSaddle>& saddles = predicted.geometry().saddles;
+  for (std::size_t i = 0; i < saddles.size(); ++i) {
+    const int first_point = first + static_cast<int>(i);
+    const FeatureObservation* before = nullptr;
+    for (std::size_t f = 0; f < view.features.size(); ++f) {
+      if (view.features[f].first_point == first_point && view.rejected[f] == 0) before = &view.features[f];
+    }
+    if (before != nullptr) {
+      out.push_back(*before);
+      continue;
+    }
+    const Eigen::Vector3d& point = predicted.points_mm()[static_cast<std::size_t>(first_point)];
     const double reach = description.pitch_mm;
     const auto px = predicted.at(point);
     const auto x = predicted.at(point + Eigen::Vector3d(reach, 0, 0));
@@ -105,7 +145,8 @@ void measure_saddles(const cv::Mat& grey, ToneCurve tone, const PredictedSheet& 
     if (!px || !(x || x_back) || !(y || y_back)) continue;
     const Eigen::Vector2d to_x = x ? *x - *px : *px - *x_back;
     const Eigen::Vector2d to_y = y ? *y - *px : *px - *y_back;
-    out.push_back(from_point(measure_saddle(grey, tone, *px, to_x, to_y), sheet, first + i));
+    out.push_back(from_point(measure_saddle(grey, tone, drawing.guess(saddles[i], *px, to_x, to_y)),
+                             view.sheet, first_point));
   }
 }
 
@@ -157,10 +198,6 @@ void measure_dots(const cv::Mat& grey, ToneCurve tone, const PredictedSheet& pre
   }
 }
 
-bool has_saddles_or_dots(const Sheet& sheet) {
-  return sheet.kind == SheetKind::charuco || sheet.kind == SheetKind::dots;
-}
-
 void detect_chessboard(const cv::Mat& grey, ToneCurve tone, const Sheet& sheet, int index,
                        SheetDetection& out) {
   const std::vector<Eigen::Vector2d> corners = find_chessboard(grey, sheet);
@@ -178,7 +215,8 @@ void detect_chessboard(const cv::Mat& grey, ToneCurve tone, const Sheet& sheet, 
       const Eigen::Vector2d at = corner(c, r);
       const Eigen::Vector2d to_x = c + 1 < columns ? corner(c + 1, r) - at : at - corner(c - 1, r);
       const Eigen::Vector2d to_y = r + 1 < rows ? corner(c, r + 1) - at : at - corner(c, r - 1);
-      out.features.push_back(from_point(measure_saddle(grey, tone, at, to_x, to_y), index, r * columns + c));
+      out.features.push_back(
+          from_point(measure_saddle(grey, tone, {at, to_x, to_y}), index, r * columns + c));
     }
   }
 }
@@ -238,9 +276,9 @@ void detect_family(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>
   }
 }
 
-// Saddles of charucos and dots at the places that the sheet's own markers predict.
-void add_predicted(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>& sheets,
-                   SheetDetection& out) {
+// Dots at the places that the sheets' own markers predict.
+void add_predicted_dots(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>& sheets,
+                        SheetDetection& out) {
   SheetPhotograph alone;
   alone.features = out.features;
   const CalibrationState start = initial_state(sheets, {alone}, grey.cols, grey.rows, std::nullopt);
@@ -249,11 +287,75 @@ void add_predicted(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>
   if (!fit.adjustment.converged) return;
   for (const SheetView& view : fit.adjustment.state.views) {
     const Sheet& sheet = sheets[static_cast<std::size_t>(view.sheet)];
-    if (!has_saddles_or_dots(sheet)) continue;
+    if (sheet.kind != SheetKind::dots) continue;
     const PredictedSheet predicted(sheet, {}, fit.adjustment.state.camera, view.camera_from_sheet);
-    measure_saddles(grey, tone, predicted, view.sheet, sheet, out.features);
     measure_dots(grey, tone, predicted, view.sheet, out.features);
   }
+}
+
+// Inner corners of a ChArUco board wherever the markers that agree predict them. Corners beside a marker that
+// was read are in view: where most of them are not found, the markers do not lie as the sheet says (another
+// board, turned by half a turn, false reads), and the sheet's features are refused.
+void add_charuco_saddles(const cv::Mat& grey, ToneCurve tone, const Sheet& sheet, int index,
+                         SheetDetection& out) {
+  constexpr double kBeside = 0.75;  // of the pitch: a marker's centre is half a diagonal, 0.71, away
+  constexpr double kLeastFound = 0.5;
+  std::vector<FeatureObservation> markers;
+  for (const FeatureObservation& feature : out.features) {
+    if (feature.sheet == index) markers.push_back(feature);
+  }
+  const SheetGeometry geometry = sheet_geometry(sheet);
+  const SheetImage image(geometry, markers);
+  const auto refuse = [&](std::string reason) {
+    for (FeatureObservation& feature : out.features) {
+      if (feature.sheet == index) feature.status = MarkerStatus::misfit;
+    }
+    out.reason = std::move(reason);
+  };
+  if (image.contradicted()) {
+    refuse(
+        fmt::format("its {} markers do not lie as the template says: check its kind, first_id and which "
+                    "squares are white",
+                    markers.size()));
+    return;
+  }
+  if (!image.known()) return;
+  std::erase_if(out.features, [index](const FeatureObservation& f) { return f.sheet == index; });
+  for (std::size_t f = 0; f < markers.size(); ++f) {
+    if (image.agrees()[f] != 0) out.features.push_back(markers[f]);
+  }
+  const SaddleDrawing drawing(sheet);
+  const int first = 4 * static_cast<int>(geometry.markers.size());
+  int beside = 0;
+  int found = 0;
+  for (std::size_t i = 0; i < geometry.saddles.size(); ++i) {
+    const Eigen::Vector2d& at = geometry.saddles[i].position_mm;
+    const auto homography = image.around(at);
+    if (!homography) continue;
+    const auto pixel = [&](const Eigen::Vector2d& mm) -> Eigen::Vector2d {
+      return (*homography * mm.homogeneous()).hnormalized();
+    };
+    const Eigen::Vector2d px = pixel(at);
+    const double reach = 0.1 * sheet.pitch_mm;  // the plane's map at the corner itself
+    const Eigen::Vector2d to_x =
+        5 * (pixel(at + Eigen::Vector2d(reach, 0)) - pixel(at - Eigen::Vector2d(reach, 0)));
+    const Eigen::Vector2d to_y =
+        5 * (pixel(at - Eigen::Vector2d(0, reach)) - pixel(at + Eigen::Vector2d(0, reach)));
+    const PointObservation point =
+        measure_saddle(grey, tone, drawing.guess(geometry.saddles[i], px, to_x, to_y));
+    out.features.push_back(from_point(point, index, first + static_cast<int>(i)));
+    if (!image.has_marker_within(kBeside * sheet.pitch_mm, at) || point.status == MarkerStatus::too_small ||
+        point.status == MarkerStatus::cut_by_frame) {
+      continue;
+    }
+    ++beside;
+    if (point.status == MarkerStatus::ok) ++found;
+  }
+  if (found >= kLeastFound * beside) return;
+  refuse(fmt::format(
+      "{} of {} corners of the board beside its markers are not where the template says: check its kind, "
+      "sizes, first_id and which squares are white",
+      beside - found, beside));
 }
 
 bool usable(const FeatureObservation& feature) { return feature.status == MarkerStatus::ok; }
@@ -297,13 +399,13 @@ std::optional<MarkerGuess> guess_at(const MarkerPattern& pattern, const Predicte
 // Features with the markers at the guesses measured in place of those that were there.
 SheetMeasurement with_markers(const cv::Mat& grey, const CameraModel& camera, const RefineOptions& options,
                               SheetMeasurement out) {
-  RefinedMarkers refined = refine_markers(grey, out.tone, out.guesses, options, &camera);
+  RefinedMarkers refined = refine_markers(grey, out.processing, out.guesses, options, &camera);
   std::erase_if(out.features, [](const FeatureObservation& feature) { return feature.points() == 4; });
   for (std::size_t k = 0; k < refined.markers.size(); ++k) {
     out.features.push_back(feature_of_marker(refined.markers[k], out.places[k].first, out.places[k].second));
   }
   out.guesses = std::move(refined.guesses);
-  out.tone = refined.tone;
+  out.processing = refined.processing;
   sort_features(out.features);
   return out;
 }
@@ -343,7 +445,13 @@ SheetDetection detect_sheets(const cv::Mat& grey, ToneCurve tone, const std::vec
   }
   for (const std::string& family : families) detect_family(grey, tone, sheets, family, out);
   sort_features(out.features);
-  if (std::any_of(sheets.begin(), sheets.end(), has_saddles_or_dots)) add_predicted(grey, tone, sheets, out);
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    if (sheets[s].kind == SheetKind::charuco)
+      add_charuco_saddles(grey, tone, sheets[s], static_cast<int>(s), out);
+  }
+  const bool dots = std::any_of(sheets.begin(), sheets.end(),
+                                [](const Sheet& sheet) { return sheet.kind == SheetKind::dots; });
+  if (dots) add_predicted_dots(grey, tone, sheets, out);
   prefer_saddles(sheets, out.features);
   sort_features(out.features);
   if (std::none_of(out.features.begin(), out.features.end(), usable) && out.reason.empty()) {
@@ -356,12 +464,12 @@ SheetMeasurement measure_sheets(const cv::Mat& grey, ToneCurve tone, const std::
                                 const std::vector<SheetShape>& shapes, const CameraModel& camera,
                                 const std::vector<SheetView>& views) {
   SheetMeasurement out;
-  out.tone = ToneResponse(tone);
+  out.processing = ToneResponse(tone);
   for (const SheetView& view : views) {
     const Sheet& sheet = sheets[static_cast<std::size_t>(view.sheet)];
     const PredictedSheet predicted(sheet, shapes[static_cast<std::size_t>(view.sheet)], camera,
                                    view.camera_from_sheet);
-    measure_saddles(grey, tone, predicted, view.sheet, sheet, out.features);
+    measure_saddles(grey, tone, predicted, view, sheet, out.features);
     measure_dots(grey, tone, predicted, view.sheet, out.features);
     if (saddles_suffice(sheets, view.sheet, out.features)) continue;
     const std::vector<SheetMarker>& markers = predicted.geometry().markers;

@@ -36,7 +36,7 @@ struct SheetMeasurement {
   std::vector<FeatureObservation> features;  ///< as SheetDetection has them
   std::vector<MarkerGuess> guesses;
   std::vector<std::pair<int, int>> places;  ///< of the guesses: sheet, first point
-  ToneResponse tone{ToneCurve::srgb};
+  Processing processing{ToneResponse(ToneCurve::srgb)};
 };
 
 /// Measures at every place where the views, which hold what was detected, predict a feature, with the

@@ -44,13 +44,14 @@ Eigen::Vector2d disc_centroid(const Eigen::Matrix3d& image_from_plane, const Eig
   return origin + sum / area;
 }
 
-// By the gradients around it (Forstner & Gulch 1987), in a window of 45 % of the way to the neighbours, at
-// most 12 px.
-PointObservation saddle_by_gradients(const cv::Mat& grey, const Eigen::Vector2d& approximate_px,
-                                     const Eigen::Vector2d& to_x_px, const Eigen::Vector2d& to_y_px) {
+// By the gradients around it (Forstner & Gulch 1987), in a window of 45 % of the way to the neighbours or as
+// far as a marker's border, at most 12 px.
+PointObservation saddle_by_gradients(const cv::Mat& grey, const SaddleGuess& guess) {
+  const Eigen::Vector2d& approximate_px = guess.px;
   PointObservation point;
   point.px = approximate_px;
-  const double half = std::min(12.0, 0.45 * std::min(to_x_px.norm(), to_y_px.norm()));
+  const double half = std::min(12.0, (guess.gap > 0 ? std::min(0.45, guess.gap) : 0.45) *
+                                         std::min(guess.to_x_px.norm(), guess.to_y_px.norm()));
   if (half < 2) {
     point.status = MarkerStatus::too_small;
     return point;
@@ -70,8 +71,8 @@ PointObservation saddle_by_gradients(const cv::Mat& grey, const Eigen::Vector2d&
                    cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 50, 1e-4));
   point.px = {static_cast<double>(corner[0].x) + window.x, static_cast<double>(corner[0].y) + window.y};
   point.covariance_px2 = kSaddleSigmaPx * kSaddleSigmaPx * Eigen::Matrix2d::Identity();
-  point.status =
-      (point.px - approximate_px).norm() < kMaxMovePx ? MarkerStatus::ok : MarkerStatus::not_refined;
+  point.status = (point.px - approximate_px).norm() < std::min(kMaxMovePx, half) ? MarkerStatus::ok
+                                                                                 : MarkerStatus::not_refined;
   return point;
 }
 
@@ -162,11 +163,10 @@ DotByArea dot_by_area(const cv::Mat& grey, const Eigen::Matrix3d& image_from_pla
 
 }  // namespace
 
-PointObservation measure_saddle(const cv::Mat& grey, ToneCurve tone, const Eigen::Vector2d& approximate_px,
-                                const Eigen::Vector2d& to_x_px, const Eigen::Vector2d& to_y_px) {
-  const PointObservation point = refine_saddle(grey, tone, approximate_px, to_x_px, to_y_px);
-  if (!only_not_photometric(point.status)) return point;
-  return saddle_by_gradients(grey, approximate_px, to_x_px, to_y_px);
+PointObservation measure_saddle(const cv::Mat& grey, ToneCurve tone, const SaddleGuess& guess) {
+  const PointObservation point = refine_saddle(grey, tone, guess);
+  if (point.status != MarkerStatus::not_refined) return point;
+  return saddle_by_gradients(grey, guess);
 }
 
 PointObservation measure_dot(const cv::Mat& grey, ToneCurve tone, const Eigen::Matrix3d& image_from_plane,

@@ -7,12 +7,9 @@
 
 namespace hexcal {
 
-/// A chessboard's inner corner near `approximate_px` by the photometric fit of refine_saddle(); where clipped
-/// or processed pixels defeat it, by the gradients around it. The covariance is then a guess; the calibration
-/// estimates the noise itself.
-[[nodiscard]] PointObservation measure_saddle(const cv::Mat& grey, ToneCurve tone,
-                                              const Eigen::Vector2d& approximate_px,
-                                              const Eigen::Vector2d& to_x_px, const Eigen::Vector2d& to_y_px);
+/// A chessboard's inner corner by the photometric fit of refine_saddle(); where that does not converge, by
+/// the gradients around it. The covariance is then a guess; the calibration estimates the noise itself.
+[[nodiscard]] PointObservation measure_saddle(const cv::Mat& grey, ToneCurve tone, const SaddleGuess& guess);
 
 /// The image of a dot's centre by the photometric fit of refine_dot(), from the centroid and the area of its
 /// darkness, so that its nominal radius need not be right; where clipped or processed pixels defeat the fit,

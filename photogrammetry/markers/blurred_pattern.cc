@@ -66,6 +66,18 @@ BlurredPattern BlurredPattern::saddle() {
   return pattern;
 }
 
+BlurredPattern BlurredPattern::saddle_between_markers() {
+  BlurredPattern pattern;
+  pattern.cells_ = 4;
+  for (int y = 0; y < 6; ++y) {
+    for (int x = 0; x < 6; ++x) {
+      const bool marker = (x < 2 || x > 3) && (y < 2 || y > 3);
+      pattern.white_.push_back((x < 3) == (y < 3) && !marker ? 1.0 : 0.0);
+    }
+  }
+  return pattern;
+}
+
 PatternSample BlurredPattern::sample(double x, double y, const Symmetric2& blur) const {
   const double sx = std::sqrt(blur.xx);
   const double sy = std::sqrt(blur.yy);

@@ -32,6 +32,10 @@ class BlurredPattern {
   /// Four quadrants meeting at (1, 1), top left and bottom right white, as where squares of a chessboard
   /// meet.
   [[nodiscard]] static BlurredPattern saddle();
+  /// The same where markers stand in the white squares, as on a ChArUco board. Its cells are as wide as the
+  /// white gap around a marker, the quadrants meet at (2, 2), and from the second cell on, both ways, a white
+  /// quadrant is black: the marker's border.
+  [[nodiscard]] static BlurredPattern saddle_between_markers();
 
   [[nodiscard]] int cells() const { return cells_; }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "photogrammetry/markers/grey_sample.h"
 #include "photogrammetry/markers/image_noise.h"
 
 namespace hexcal {
@@ -13,22 +14,6 @@ constexpr int kPlacesPerSide = 32;
 constexpr double kStepPx = 0.5;
 constexpr double kMaxReachPx = 6;
 constexpr std::size_t kMinPlaces = 5;
-
-// Bilinear; none outside the frame.
-std::optional<double> pixel_value(const cv::Mat& grey, const Eigen::Vector2d& px) {
-  const double fx = std::floor(px.x());
-  const double fy = std::floor(px.y());
-  const int x = static_cast<int>(fx);
-  const int y = static_cast<int>(fy);
-  if (x < 0 || y < 0 || x + 1 >= grey.cols || y + 1 >= grey.rows) return std::nullopt;
-  const auto at = [&grey](int row, int column) -> double {
-    return grey.depth() == CV_16U ? grey.at<std::uint16_t>(row, column) : grey.at<std::uint8_t>(row, column);
-  };
-  const double sx = px.x() - fx;
-  const double sy = px.y() - fy;
-  return (at(y, x) * (1 - sx) + at(y, x + 1) * sx) * (1 - sy) +
-         (at(y + 1, x) * (1 - sx) + at(y + 1, x + 1) * sx) * sy;
-}
 
 struct Line {
   Eigen::Vector2d point, direction;
@@ -88,7 +73,7 @@ std::optional<std::array<Eigen::Vector2d, 4>> scan_edges(const cv::Mat& grey, co
       const int steps = static_cast<int>(2 * reach / kStepPx) + 1;
       bool inside_frame = true;
       for (int k = 0; k < steps && inside_frame; ++k) {
-        const auto value = pixel_value(grey, middle + outward * (k * kStepPx - reach));
+        const auto value = grey_sample(grey, middle + outward * (k * kStepPx - reach));
         inside_frame = value.has_value();
         if (inside_frame) profile.push_back(tone.decode(*value / scale));
       }

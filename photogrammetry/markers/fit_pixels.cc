@@ -73,29 +73,6 @@ Span span_in_rows(const std::array<Eigen::Vector2d, 4>& hull, double top, double
 
 }  // namespace
 
-std::optional<InverseHomography> homography_from_corners(const std::array<Eigen::Vector2d, 4>& corners) {
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Eigen::Vector2d a = corners[(i + 1) % 4] - corners[i];
-    const Eigen::Vector2d b = corners[(i + 2) % 4] - corners[(i + 1) % 4];
-    if (!(a.x() * b.y() - a.y() * b.x() > 1e-12)) return std::nullopt;
-  }
-  static constexpr double kSquare[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
-  Eigen::Matrix<double, 8, 8> a = Eigen::Matrix<double, 8, 8>::Zero();
-  Eigen::Matrix<double, 8, 1> b;
-  for (int i = 0; i < 4; ++i) {
-    const Eigen::Vector2d& n = corners[static_cast<std::size_t>(i)];
-    for (int k = 0; k < 2; ++k) {
-      const double t = kSquare[i][k];
-      a.block<1, 3>(2 * i + k, 3 * k) << n.x(), n.y(), 1;
-      a.block<1, 2>(2 * i + k, 6) = -t * n.transpose();
-      b[2 * i + k] = t;
-    }
-  }
-  const InverseHomography g = a.partialPivLu().solve(b);
-  if (!g.allFinite()) return std::nullopt;
-  return g;
-}
-
 FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, const PixelMapPatch& patch,
                         const FitRequest& request, const cv::Rect& box, const PixelSelection& selection) {
   FitPixels result;
@@ -104,6 +81,8 @@ FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, 
   const double half_pattern = 0.5 * request.pattern.cells();
   const double scale = 1 / full_scale(grey);
   const bool wide = grey.depth() == CV_16U;
+  const int black_clip = photograph.noise.black_clip();
+  const int white_clip = photograph.noise.white_clip();
   const double px_to_plane = 1 / frame.half_side;
 
   // Outline of what can be near a transition, in pixels: the pattern grown by the reach.
@@ -114,7 +93,8 @@ FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, 
     g << selection.homography[0], selection.homography[1], selection.homography[2], selection.homography[3],
         selection.homography[4], selection.homography[5], selection.homography[6], selection.homography[7], 1;
     const Eigen::Matrix3d h = g.inverse();
-    const double extent = std::min(half_pattern, request.window_cells) / half_square;
+    const double extent =
+        (request.window_cells < kNoWindow ? request.window_cells : half_pattern) / half_square;
     for (std::size_t i = 0; i < 4; ++i) {
       const Eigen::Vector3d n = h * Eigen::Vector3d(kSquare[i][0] * extent, kSquare[i][1] * extent, 1);
       hull[i] = photograph.map.pixel_from_ideal(frame.middle + n.hnormalized() * frame.half_side, nullptr);
@@ -187,11 +167,11 @@ FitPixels select_pixels(const cv::Mat& grey, const PhotographModel& photograph, 
     const Eigen::Vector2d u = square.t * half_square + Eigen::Vector2d::Constant(half_pattern);
     if ((u.array() - half_pattern).abs().maxCoeff() > request.window_cells) return;
     const int raw = wide ? grey.at<std::uint16_t>(y, x) : grey.at<std::uint8_t>(y, x);
-    if (raw == 0 || raw == (wide ? 65535 : 255)) {
-      ++result.clipped;
-      return;
-    }
-    pixel.value = raw * scale;
+    pixel.censored = raw >= white_clip ? 1 : raw <= black_clip ? -1 : 0;
+    if (pixel.censored != 0) ++result.clipped;
+    // A bound lies half a step inside the value that is shown.
+    pixel.value = pixel.censored == 0 ? raw * scale
+                                      : (pixel.censored > 0 ? white_clip - 0.5 : black_clip + 0.5) * scale;
     pixel.weight = 1 / std::sqrt(photograph.noise.variance(pixel.value));
     if (request.free_lens) {
       pixel.by_lens =

@@ -20,8 +20,39 @@ struct WindowNoise {
   bool clipped;
 };
 
+// Where a heap at the end of a histogram begins, walking inwards from its last value that occurs; `end` (the
+// end of the scale) without one. Clipping piles up whatever lay beyond on one value, and noise after it
+// (JPEG) on its neighbours; light alone gives no value many times the pixels of those a little further in.
+int clip_from(const std::array<int, 256>& histogram, int end, int inwards) {
+  constexpr int kSearched = 24;  // from the end of the scale
+  constexpr int kHeap = 4;       // values it spreads over
+  constexpr int kBeside = 8;     // values beside it
+  constexpr double kHeight = 6;  // over the mean of those
+  constexpr int kLeastPixels = 20;
+  int last = end;
+  while (std::abs(last - end) < kSearched && histogram[static_cast<std::size_t>(last)] == 0) last += inwards;
+  int peak = last;
+  for (int k = 0; k < kHeap; ++k) {
+    const int at = last + k * inwards;
+    if (histogram[static_cast<std::size_t>(at)] > histogram[static_cast<std::size_t>(peak)]) peak = at;
+  }
+  const int height = histogram[static_cast<std::size_t>(peak)];
+  double beside = 0;
+  for (int k = kHeap; k < kHeap + kBeside; ++k) {
+    beside += histogram[static_cast<std::size_t>(peak + k * inwards)] / double{kBeside};
+  }
+  if (height < kLeastPixels || height < kHeight * beside) return end;
+  int from = peak;
+  for (int k = 1; k < kHeap; ++k) {
+    const int at = peak + k * inwards;
+    if (histogram[static_cast<std::size_t>(at)] < 0.1 * height) break;
+    from = at;
+  }
+  return from;
+}
+
 template <typename Pixel>
-WindowNoise window_noise(const cv::Mat& grey, int x0, int y0) {
+WindowNoise window_noise(const cv::Mat& grey, int x0, int y0, int black_clip, int white_clip) {
   constexpr double kMiddle = 0.5 * (kWindow - 1);
   constexpr int kCount = kWindow * kWindow;
   double sum = 0;
@@ -33,7 +64,7 @@ WindowNoise window_noise(const cv::Mat& grey, int x0, int y0) {
     const Pixel* row = grey.ptr<Pixel>(y0 + y) + x0;
     for (int x = 0; x < kWindow; ++x) {
       const double value = row[x];
-      clipped = clipped || row[x] == 0 || row[x] == std::numeric_limits<Pixel>::max();
+      clipped = clipped || row[x] <= black_clip || row[x] >= white_clip;
       sum += value;
       squares += value * value;
       along_x += value * (x - kMiddle);
@@ -43,6 +74,21 @@ WindowNoise window_noise(const cv::Mat& grey, int x0, int y0) {
   constexpr double kMoment = kWindow * (kWindow * (kWindow * kWindow - 1) / 12.0);
   const double rest = squares - sum * sum / kCount - (along_x * along_x + along_y * along_y) / kMoment;
   return {sum / kCount, std::max(rest, 0.0) / (kCount - 3), clipped};
+}
+
+// 16 bits come from RAW or a program: they clip at the end of the scale alone.
+void find_clipping(const cv::Mat& grey, const cv::Rect& box, int& black_clip, int& white_clip) {
+  black_clip = 0;
+  white_clip = grey.depth() == CV_16U ? 65535 : 255;
+  if (grey.depth() == CV_16U) return;
+  std::array<int, 256> histogram{};
+  const int step = std::max(1, static_cast<int>(std::sqrt(box.area() / 250000.0)));
+  for (int y = box.y; y < box.y + box.height; y += step) {
+    const std::uint8_t* row = grey.ptr(y);
+    for (int x = box.x; x < box.x + box.width; x += step) ++histogram[row[x]];
+  }
+  black_clip = clip_from(histogram, 0, 1);
+  white_clip = clip_from(histogram, 255, -1);
 }
 
 }  // namespace
@@ -60,12 +106,17 @@ NoiseModel estimate_noise(const cv::Mat& grey, const cv::Rect& region) {
   const cv::Rect box = region & cv::Rect(0, 0, grey.cols, grey.rows);
   const double scale = full_scale(grey);
   const double rounding = 1 / (12 * scale * scale);
+  NoiseModel model;
+  find_clipping(grey, box, model.black_clip_, model.white_clip_);
   std::array<std::vector<double>, NoiseModel::kLevels> by_level;
+  const int black = model.black_clip_;
+  const int white = model.white_clip_;
   const auto stride_of = [](int length) { return std::max(length / kMaxWindowsPerAxis, kWindow / 2); };
   for (int y = box.y; y + kWindow <= box.y + box.height; y += stride_of(box.height)) {
     for (int x = box.x; x + kWindow <= box.x + box.width; x += stride_of(box.width)) {
-      const WindowNoise window = grey.depth() == CV_16U ? window_noise<std::uint16_t>(grey, x, y)
-                                                        : window_noise<std::uint8_t>(grey, x, y);
+      const WindowNoise window = grey.depth() == CV_16U
+                                     ? window_noise<std::uint16_t>(grey, x, y, black, white)
+                                     : window_noise<std::uint8_t>(grey, x, y, black, white);
       if (window.clipped) continue;
       const double level = window.mean / scale * (NoiseModel::kLevels - 1);
       by_level[static_cast<std::size_t>(level + 0.5)].push_back(window.variance / (scale * scale));
@@ -82,7 +133,6 @@ NoiseModel estimate_noise(const cv::Mat& grey, const cv::Rect& region) {
     found[i] = std::max(*nth / kQuantileOfUnitVariance, rounding);
     quietest = std::min(quietest, found[i]);
   }
-  NoiseModel model;
   if (!std::isfinite(quietest)) {
     model.at_level_.fill(std::max(1.0 / (255.0 * 255.0), rounding));
     return model;

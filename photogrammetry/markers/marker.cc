@@ -178,4 +178,16 @@ const char* marker_status_name(MarkerStatus status) {
   return "";
 }
 
+const char* marker_method_name(MarkerMethod method) {
+  switch (method) {
+    case MarkerMethod::photometric:
+      return "photometric";
+    case MarkerMethod::edges:
+      return "edges";
+    case MarkerMethod::quad:
+      return "quad";
+  }
+  return "";
+}
+
 }  // namespace hexcal

@@ -34,15 +34,22 @@ enum class MarkerStatus {
   ok,
   cut_by_frame,  ///< the frame's edge cuts the marker: its corners cannot be trusted
   mirrored,      ///< read only when mirrored: photographed through a mirror
-  saturated,     ///< white or black clips
+  saturated,     ///< so much clips that no edge is left to measure
   too_small,     ///< fewer pixels per side than can be measured
   too_steep,     ///< seen at too flat an angle
   low_contrast,
-  occluded,     ///< too little of the pattern is visible
-  misfit,       ///< the photometric model does not explain the pixels (chi^2)
+  occluded,  ///< too few of the pattern's edges are where they should be
+  misfit,  ///< its edges fit a flat square much worse than the others' of the photograph: bent, another thing
   inverted,     ///< read only as a negative: black and white are swapped
   duplicate,    ///< the same id was read twice in the photograph
   not_refined,  ///< the refinement did not converge
+};
+
+/// How a marker's corners were measured, best first.
+enum class MarkerMethod {
+  photometric,  ///< the whole pattern's model fitted to the pixels
+  edges,        ///< the places of its edges alone: the photometric model does not hold in this picture
+  quad,         ///< the outline that was found, its sides looked up once: too few edges for more
 };
 
 /// A marker seen in a photograph. Corners 0 top-left, 1 top-right, 2 bottom-right, 3 bottom-left of the
@@ -51,8 +58,9 @@ enum class MarkerStatus {
 struct MarkerObservation {
   int id = -1;
   MarkerStatus status = MarkerStatus::not_refined;
+  MarkerMethod method = MarkerMethod::quad;
   std::array<Eigen::Vector2d, 4> corners_px;
-  /// Covariance in px^2 of (x0, y0, x1, y1, ..., y3), already scaled by the misfit if chi^2 says so.
+  /// Covariance in px^2 of (x0, y0, x1, y1, ..., y3), as large as the residuals of the method say.
   Eigen::Matrix<double, 8, 8> covariance_px2 = Eigen::Matrix<double, 8, 8>::Identity();
   double chi2_per_dof = 0;  ///< of the photometric fit
   double blur_px = 0;       ///< standard deviation of the fitted point spread
@@ -61,5 +69,6 @@ struct MarkerObservation {
 };
 
 [[nodiscard]] const char* marker_status_name(MarkerStatus status);
+[[nodiscard]] const char* marker_method_name(MarkerMethod method);
 
 }  // namespace hexcal

@@ -8,7 +8,7 @@
 #include "photogrammetry/markers/blurred_pattern.h"
 #include "photogrammetry/markers/image_noise.h"
 #include "photogrammetry/markers/pixel_map.h"
-#include "photogrammetry/photograph/tone_response.h"
+#include "photogrammetry/markers/processing.h"
 
 namespace hexcal {
 
@@ -17,11 +17,15 @@ struct PhotographModel {
   PixelMap map;
   ToneResponse tone;
   NoiseModel noise;
+  Sharpening sharpening = {};
 };
 
 /// Parameters of the photograph that one marker's fit may estimate: the tone curve's two, the lens stand-in's
-/// two.
-constexpr int kNumShared = 4;
+/// two, the sharpening's two.
+constexpr int kNumShared = 6;
+
+/// FitRequest::window_cells of a pattern that is fitted whole.
+constexpr double kNoWindow = 1e9;
 
 struct FitRequest {
   BlurredPattern pattern;
@@ -29,10 +33,11 @@ struct FitRequest {
   std::array<Eigen::Vector2d, 4> corners_px{};  ///< of that square, within 0.5 px or so
   bool affine = false;                          ///< no perspective: a saddle point's small window
   bool free_tone = false;
-  bool free_lens = false;   ///< only without a camera
+  bool free_lens = false;  ///< only without a camera
+  bool free_sharpening = false;
   double lens_sigma = 0.3;  ///< of the lens stand-in's parameters as they are
-  /// Half the side of the window of a saddle point in cells; infinite for markers.
-  double window_cells = 1e9;
+  /// Half the side of the window of a saddle point in cells; markers are fitted whole.
+  double window_cells = kNoWindow;
   int max_pixels = 6000;  ///< more are thinned
   /// From an earlier fit whose corners these are: the coarse stage is left out.
   std::optional<double> blur_px = std::nullopt;

@@ -19,6 +19,7 @@ constexpr double kPixelVariance = 1.0 / 12;
 constexpr double kReachPx = 4;
 constexpr double kMinRadiusPx = 2;
 constexpr double kMaxMovePx = 4;
+constexpr double kMaxClippedShare = 0.02;  // of its pixels
 constexpr double kNoiseMarginPx = 40;
 constexpr std::size_t kMaxPixels = 1500;
 constexpr int kMaxIterations = 20;
@@ -287,7 +288,7 @@ PointObservation refine_dot(const cv::Mat& grey, ToneCurve tone, const Eigen::Ma
   const double clipped = selected.clipped;
   if (!point.px.allFinite() || p.head<2>().norm() > kMaxMovePx) {
     point.status = MarkerStatus::not_refined;
-  } else if (clipped > options.max_saturated * (static_cast<double>(selected.pixels.size()) + clipped)) {
+  } else if (clipped > kMaxClippedShare * (static_cast<double>(selected.pixels.size()) + clipped)) {
     point.status = MarkerStatus::saturated;
   } else if (point.contrast < options.min_contrast) {
     point.status = MarkerStatus::low_contrast;

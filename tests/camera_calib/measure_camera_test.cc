@@ -108,11 +108,48 @@ TEST(DetectSheets, SaysWhatIsNotThere) {
   expect_nothing_found(sheet_of(SheetKind::photomodeler), paper, "the four ringed dots were not found");
   expect_nothing_found(sheet_of(SheetKind::chessboard), paper, "the whole chessboard was not found");
   expect_nothing_found(tag_grid_from(0), paper, "no sheet was found");
-  SheetLight glaring;
-  glaring.white = 1.2;
-  const Sheet grid = tag_grid_from(0);
-  expect_nothing_found(grid, sheet_photograph(grid, camera, whole_sheet_view(grid, camera, 0), glaring),
-                       "no feature of the sheet can be measured");
+}
+
+Sheet charuco_board() {
+  Sheet sheet;
+  sheet.kind = SheetKind::charuco;
+  sheet.family = "DICT_4X4_50";
+  sheet.columns = 9;
+  sheet.rows = 6;
+  sheet.pitch_mm = 16;
+  sheet.marker_mm = 12;
+  return sheet;
+}
+
+// Overexposed paper, and a false read beside the board.
+TEST(DetectSheets, FindsEveryCornerOfACharuco) {
+  const CameraModel camera(720, 540, 780);
+  const Sheet sheet = charuco_board();
+  SheetLight light;
+  light.white = 1.2;
+  cv::Mat grey = sheet_photograph(sheet, camera, whole_sheet_view(sheet, camera, 0), light);
+  const cv::Mat again = grey(cv::Rect(330, 240, 60, 60)).clone();  // a marker of the board
+  again.copyTo(grey(cv::Rect(4, 4, 60, 60)));
+  const SheetDetection detection = detect_sheets(grey, ToneCurve::srgb, {sheet});
+  const auto usable = std::count_if(
+      detection.features.begin(), detection.features.end(),
+      [](const FeatureObservation& f) { return f.status == MarkerStatus::ok && f.points() == 1; });
+  EXPECT_EQ(usable, 40);
+  EXPECT_EQ(detection.reason, "");
+}
+
+// Read by another template, whose markers stand where this board's squares are black.
+TEST(DetectSheets, RefusesABoardWhoseMarkersDoNotLieAsTheTemplateSays) {
+  const CameraModel camera(720, 540, 780);
+  Sheet sheet = charuco_board();
+  sheet.columns = 8;  // an odd number would be the same board moved by a square
+  Sheet other = sheet;
+  other.top_left_white = true;
+  const cv::Mat grey = sheet_photograph(sheet, camera, whole_sheet_view(sheet, camera, 0));
+  const SheetDetection detection = detect_sheets(grey, ToneCurve::srgb, {other});
+  EXPECT_TRUE(std::none_of(detection.features.begin(), detection.features.end(),
+                           [](const FeatureObservation& f) { return f.status == MarkerStatus::ok; }));
+  EXPECT_THAT(detection.reason, ::testing::HasSubstr("the template says"));
 }
 
 TEST(MeasureCamera, LeavesOutPhotographsOfAnotherSettingAndOfAnotherSheet) {

@@ -56,7 +56,7 @@ void look(const cv::Mat& grey, ToneCurve tone, std::uint8_t what, double a, doub
       for (const auto& marker : detect_markers(grey, tone, marker_family("DICT_4X4_50"))) check(marker);
       return;
     case 3:
-      return check(refine_saddle(grey, tone, {a, b}, {12, b / 8}, {-a / 8, 12}));
+      return check(refine_saddle(grey, tone, {{a, b}, {12, b / 8}, {-a / 8, 12}, a / 512, b / 512}));
     case 4: {
       Eigen::Matrix3d image_from_plane;
       image_from_plane << 1 + a / 256, 0.1, a, b / 256, 1, b, 1e-4 * a, 1e-5 * b, 1;

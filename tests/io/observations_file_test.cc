@@ -23,6 +23,7 @@ DetectionSet example_set() {
   MarkerObservation marker;
   marker.id = 7;
   marker.status = MarkerStatus::ok;
+  marker.method = MarkerMethod::edges;
   for (int i = 0; i < 4; ++i) marker.corners_px[static_cast<std::size_t>(i)] = {100.0 / 3 + i, 0.1 * i};
   marker.covariance_px2.setIdentity();
   marker.covariance_px2(3, 1) = marker.covariance_px2(1, 3) = 1e-5 / 3;
@@ -44,6 +45,7 @@ TEST(ObservationsFile, ReadingGivesBackEveryBit) {
   ASSERT_EQ(set.photographs.size(), 2U);
   EXPECT_EQ(set.photographs[0].name, "home, \"first\".jpg");
   EXPECT_EQ(set.photographs[0].markers[0].corners_px[2].x(), 100.0 / 3 + 2);
+  EXPECT_EQ(set.photographs[0].markers[0].method, MarkerMethod::edges);
   EXPECT_EQ(set.photographs[0].markers[0].covariance_px2,
             example_set().photographs[0].markers[0].covariance_px2);
   EXPECT_EQ(set.photographs[1].status, PhotographStatus::truncated);

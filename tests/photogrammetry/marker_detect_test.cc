@@ -93,16 +93,40 @@ TEST(DetectMarkers, CutByTheFrameIsNeverTrusted) {
   }
 }
 
-TEST(DetectMarkers, SaturatedIsNamed) {
-  Scene scene = one_marker(usual().patterns[5], 90, 0.2, 0);
-  scene.grey.convertTo(scene.grey, -1, 1.4, 0);
-  EXPECT_EQ(status_of(scene.grey), MarkerStatus::saturated);
+// White that clips, at the end of the scale or below it, hides how much light there was; edges stay in place.
+TEST(DetectMarkers, ClippedWhiteIsMeasuredWithinItsSigma) {
+  for (const double ceiling : {255.0, 250.0}) {
+    double largest = 0;
+    double sum = 0;
+    for (int i = 0; i < 6; ++i) {
+      Scene scene = one_marker(usual().patterns[static_cast<std::size_t>(i)], 90, 0.2 + 0.4 * i, 0.1 * i);
+      scene.grey.convertTo(scene.grey, -1, 1.25, 0);
+      scene.grey = cv::min(scene.grey, ceiling);
+      const auto markers = detect_markers(scene.grey, ToneCurve::srgb, usual());
+      ASSERT_EQ(markers.size(), 1U);
+      EXPECT_EQ(markers[0].status, MarkerStatus::ok) << marker_status_name(markers[0].status);
+      largest = std::max(largest, largest_error(markers[0], scene.corners));
+      Eigen::Matrix<double, 8, 1> error;
+      for (int c = 0; c < 4; ++c) {
+        const auto corner = static_cast<std::size_t>(c);
+        error.segment<2>(2 * c) = markers[0].corners_px[corner] - scene.corners[corner];
+      }
+      sum += error.dot(markers[0].covariance_px2.ldlt().solve(error)) / 8;
+    }
+    EXPECT_LT(largest, 0.25) << ceiling;
+    EXPECT_LT(sum / 6, 2.5) << ceiling;
+  }
 }
 
 TEST(DetectMarkers, ToSteepIsNamed) {
-  EXPECT_EQ(status_of(one_marker(usual().patterns[5], 300, 0.4, 78 * kRadPerDeg).grey),
+  EXPECT_EQ(status_of(one_marker(usual().patterns[5], 300, 0.4, 83 * kRadPerDeg).grey),
             MarkerStatus::too_steep);
-  EXPECT_EQ(status_of(one_marker(usual().patterns[5], 300, 0.4, 72 * kRadPerDeg).grey), MarkerStatus::ok);
+  const Scene scene = one_marker(usual().patterns[5], 300, 0.4, 78 * kRadPerDeg);
+  const auto markers = detect_markers(scene.grey, ToneCurve::srgb, usual());
+  ASSERT_EQ(markers.size(), 1U);
+  EXPECT_EQ(markers[0].status, MarkerStatus::ok) << marker_status_name(markers[0].status);
+  EXPECT_LT(largest_error(markers[0], scene.corners),
+            5 * std::sqrt(markers[0].covariance_px2.diagonal().maxCoeff()));
 }
 
 // How many of 20 markers of so many pixels a side are read; none may be read as another, and what is trusted
@@ -213,6 +237,43 @@ TEST(DetectMarkers, StrongJpegAndSharpeningWidenTheSigmas) {
     EXPECT_EQ(markers[0].status, MarkerStatus::ok) << marker_status_name(markers[0].status);
     EXPECT_LT(largest_error(markers[0], scene.corners), 0.1);
     EXPECT_GT(markers[0].covariance_px2.trace(), plain[0].covariance_px2.trace());
+  }
+}
+
+// Halos as a phone's sharpening and smoothing leave them, clipped and no longer linear: whatever measures the
+// markers, their sigma is what it and the edges disagree by.
+TEST(DetectMarkers, HeavyHalosAreMeasuredWithinTheirSigma) {
+  double sum = 0;
+  for (int i = 0; i < 6; ++i) {
+    const Scene scene =
+        one_marker(usual().patterns[static_cast<std::size_t>(i)], 100, 0.3 + 0.5 * i, 0.1 * i);
+    cv::Mat soft;
+    cv::GaussianBlur(scene.grey, soft, {}, 2.0);
+    cv::Mat grey;
+    cv::addWeighted(scene.grey, 2.6, soft, -1.6, 0, grey);
+    cv::medianBlur(grey, grey, 3);
+    const auto markers = detect_markers(grey, ToneCurve::srgb, usual());
+    ASSERT_EQ(markers.size(), 1U);
+    EXPECT_EQ(markers[0].status, MarkerStatus::ok) << marker_status_name(markers[0].status);
+    EXPECT_LT(largest_error(markers[0], scene.corners), 0.3);
+    Eigen::Matrix<double, 8, 1> error;
+    for (int c = 0; c < 4; ++c) {
+      const auto corner = static_cast<std::size_t>(c);
+      error.segment<2>(2 * c) = markers[0].corners_px[corner] - scene.corners[corner];
+    }
+    sum += error.dot(markers[0].covariance_px2.ldlt().solve(error)) / 8;
+  }
+  EXPECT_LT(sum / 6, 2.5);
+}
+
+// A finger over the rim: what is left is read, and too little to be trusted.
+TEST(DetectMarkers, TooMuchCoveredIsOccluded) {
+  Scene scene = one_marker(usual().patterns[5], 120, 0, 0);
+  const cv::Point from(static_cast<int>(scene.corners[0].x()) - 20,
+                       static_cast<int>(scene.corners[0].y()) - 20);
+  cv::Mat(scene.grey, cv::Rect(from.x, from.y, 160, 48)).setTo(90);
+  for (const auto& marker : detect_markers(scene.grey, ToneCurve::srgb, usual())) {
+    EXPECT_NE(marker.status, MarkerStatus::ok);
   }
 }
 

@@ -40,8 +40,9 @@ Errors measure(double noise) {
   for (int j = 1; j < 8; ++j) {
     for (int i = 1; i < 8; ++i) {
       const Eigen::Vector2d truth = at(i, j);
-      const PointObservation point = refine_saddle(grey, ToneCurve::srgb, truth + Eigen::Vector2d(0.6, -0.7),
-                                                   at(i + 1, j) - truth, at(i, j + 1) - truth);
+      const PointObservation point =
+          refine_saddle(grey, ToneCurve::srgb,
+                        {truth + Eigen::Vector2d(0.6, -0.7), at(i + 1, j) - truth, at(i, j + 1) - truth});
       if (point.status != MarkerStatus::ok) continue;
       const Eigen::Vector2d error = point.px - truth;
       ++errors.found;
@@ -66,12 +67,51 @@ TEST(RefineSaddle, NoisyCornersKeepTheBudget) {
   EXPECT_LT(errors.rms_px, 0.02);
 }
 
+// A ChArUco board's four squares around one corner, of 48 cells each: markers of 42 cells leave a gap of 3.
+// Top left and bottom right are white, with a marker of which only the black border matters.
+MarkerPattern charuco_corner() {
+  constexpr int kSquare = 48;
+  constexpr int kGap = 3;
+  MarkerPattern pattern{2 * kSquare, 2 * kSquare, {}};
+  for (int y = 0; y < 2 * kSquare; ++y) {
+    for (int x = 0; x < 2 * kSquare; ++x) {
+      const bool white_square = (x < kSquare) == (y < kSquare);
+      const auto in_marker = [](int at) { return at % kSquare >= kGap && at % kSquare < kSquare - kGap; };
+      pattern.white.push_back(white_square && !(in_marker(x) && in_marker(y)) ? 1 : 0);
+    }
+  }
+  return pattern;
+}
+
+// Squares of 40 px, so that markers stand 2.5 px from the corner's edges.
+TEST(RefineSaddle, MarkersBesideItArePartOfTheModel) {
+  TestImage image;
+  image.width_px = image.height_px = 120;
+  image.noise = 1;
+  const Eigen::Matrix3d board = testing::tilted_square({60.2, 59.7}, 80, 0.5, 0.3, 0.4);
+  const cv::Mat grey = testing::render_image(image, {testing::flat_marker(charuco_corner(), board)});
+  const auto at = [&board](double x, double y) -> Eigen::Vector2d {
+    return (board * Eigen::Vector3d(x, y, 1)).hnormalized();
+  };
+  const Eigen::Vector2d truth = at(0, 0);
+  SaddleGuess guess{truth + Eigen::Vector2d(0.6, -0.5), at(1, 0) - truth, at(0, 1) - truth, 3.0 / 48,
+                    7.0 / 48};
+  const PointObservation point = refine_saddle(grey, ToneCurve::srgb, guess);
+  EXPECT_EQ(point.status, MarkerStatus::ok);
+  EXPECT_LT((point.px - truth).norm(), 0.03);
+  guess.top_left_white = true;
+  EXPECT_EQ(refine_saddle(grey, ToneCurve::srgb, guess).status, MarkerStatus::ok);
+  guess.top_left_white = false;  // a board turned by half a turn
+  EXPECT_EQ(refine_saddle(grey, ToneCurve::srgb, guess).status, MarkerStatus::misfit);
+}
+
 TEST(RefineSaddle, RefusesFlatPaperAndTheFramesEdge) {
   const cv::Mat grey(100, 100, CV_8UC1, cv::Scalar(128));
-  EXPECT_NE(refine_saddle(grey, ToneCurve::srgb, {50, 50}, {20, 0}, {0, 20}).status, MarkerStatus::ok);
-  EXPECT_EQ(refine_saddle(grey, ToneCurve::srgb, {2, 50}, {20, 0}, {0, 20}).status,
+  EXPECT_NE(refine_saddle(grey, ToneCurve::srgb, {{50, 50}, {20, 0}, {0, 20}}).status, MarkerStatus::ok);
+  EXPECT_EQ(refine_saddle(grey, ToneCurve::srgb, {{2, 50}, {20, 0}, {0, 20}}).status,
             MarkerStatus::cut_by_frame);
-  EXPECT_EQ(refine_saddle(grey, ToneCurve::srgb, {50, 50}, {3, 0}, {0, 20}).status, MarkerStatus::too_small);
+  EXPECT_EQ(refine_saddle(grey, ToneCurve::srgb, {{50, 50}, {3, 0}, {0, 20}}).status,
+            MarkerStatus::too_small);
 }
 
 }  // namespace

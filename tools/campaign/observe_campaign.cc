@@ -19,7 +19,7 @@ namespace hexcal {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kCacheFormat = 2;  // counts up when detection changes what it finds
+constexpr int kCacheFormat = 3;  // counts up when detection changes what it finds
 
 std::string ids_text(const std::vector<int>& ids) {
   std::string text;

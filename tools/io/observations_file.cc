@@ -25,7 +25,8 @@ constexpr std::string_view kLegend =
     "blur_px,\n"
     "#                 contrast, side_px, then the lower triangle of the covariance of x0 y0 ... y3 row by "
     "row (36, "
-    "px^2)\n"
+    "px^2),\n"
+    "#                 method (photometric, edges or quad: how it was measured; absent in older files)\n"
     "# A marker belongs to the photograph above it; a photograph without one shows none. Empty: not known.\n"
     "# Pixel (0, 0) is the centre of the top-left pixel; corners 0 top-left, 1 top-right, 2 bottom-right, 3 "
     "bottom-left.\n";
@@ -69,7 +70,7 @@ void append_marker(std::string& text, const MarkerObservation& marker) {
   for (int row = 0; row < 8; ++row) {
     for (int column = 0; column <= row; ++column) text += ',' + field(marker.covariance_px2(row, column));
   }
-  text += '\n';
+  text += fmt::format(",{}\n", marker_method_name(marker.method));
 }
 
 // ---- Reading ----
@@ -90,6 +91,7 @@ class Record {
 
   void add(std::string text) { fields_.push_back(std::move(text)); }
   [[nodiscard]] const std::string& kind() const { return fields_.front(); }
+  [[nodiscard]] std::size_t size() const { return fields_.size(); }
 
   [[noreturn]] void fail(const std::string& message) const {
     throw InputError(fmt::format("{}:{}: {}", path_.string(), line_, message));
@@ -122,10 +124,10 @@ class Record {
     take(value.emplace());
   }
   template <typename Status>
-  void take_status(Status& status, const char* (*name_of)(Status)) {
+  void take_name(Status& status, const char* what, const char* (*name_of)(Status)) {
     const std::string& name = next();
     const auto found = status_from_name(name, name_of);
-    if (!found) fail(fmt::format("found status '{}', which is none", name));
+    if (!found) fail(fmt::format("found {} '{}', which is none", what, name));
     status = *found;
   }
 
@@ -217,7 +219,7 @@ PhotographObservations photograph_from(Record& record) {
   PhotographInfo& info = photograph.info;
   record.take(photograph.name);
   record.take(photograph.sha256);
-  record.take_status(photograph.status, photograph_status_name);
+  record.take_name(photograph.status, "status", photograph_status_name);
   record.take(photograph.reason);
   record.take(info.width_px);
   record.take(info.height_px);
@@ -237,11 +239,13 @@ PhotographObservations photograph_from(Record& record) {
 }
 
 MarkerObservation marker_from(Record& record) {
-  record.expect_size(51);
+  constexpr std::size_t kWithoutMethod = 51;
+  const bool has_method = record.size() != kWithoutMethod;
+  record.expect_size(has_method ? kWithoutMethod + 1 : kWithoutMethod);
   MarkerObservation marker;
   record.take(marker.id);
   if (marker.id < 0) record.fail(fmt::format("found id {}, wanted none below 0", marker.id));
-  record.take_status(marker.status, marker_status_name);
+  record.take_name(marker.status, "status", marker_status_name);
   for (auto& corner : marker.corners_px) {
     record.take(corner.x());
     record.take(corner.y());
@@ -256,6 +260,8 @@ MarkerObservation marker_from(Record& record) {
       marker.covariance_px2(column, row) = marker.covariance_px2(row, column);
     }
   }
+  marker.method = MarkerMethod::photometric;
+  if (has_method) record.take_name(marker.method, "method", marker_method_name);
   return marker;
 }
 
