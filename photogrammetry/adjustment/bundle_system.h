@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "kinematics/geometry/pose.h"
 #include "photogrammetry/adjustment/bundle_priors.h"
 
 namespace hexcal {
