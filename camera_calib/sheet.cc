@@ -6,8 +6,10 @@
 #include <array>
 #include <set>
 
+#include "camera_calib/printed_marker.h"
 #include "kinematics/geometry/input_error.h"
 #include "photogrammetry/markers/marker.h"
+#include "photogrammetry/markers/printed_pattern.h"
 
 namespace hexcal {
 namespace {
@@ -57,6 +59,10 @@ void validate_ids(const Sheet& sheet) {
       throw InputError(fmt::format("sheet: id {} is not in {}, which has ids 0 to {}", marker.id,
                                    sheet.family, known - 1));
     }
+    if (same_when_turned(marker_family(sheet.family).patterns[static_cast<std::size_t>(marker.id)])) {
+      throw InputError(fmt::format("sheet: id {} of {} looks the same when it is turned, wanted another id",
+                                   marker.id, sheet.family));
+    }
     if (!seen.insert(marker.id).second) {
       throw InputError(fmt::format("sheet: id {} stands twice, wanted each id once", marker.id));
     }
@@ -70,7 +76,7 @@ Eigen::Vector2d cell_centre(const Sheet& sheet, double pitch, int column, int ro
 
 SheetGeometry tag_grid(const Sheet& sheet) {
   SheetGeometry geometry;
-  const double pitch = sheet.marker_mm + sheet.spacing_mm;
+  const double pitch = printed_marker_mm(sheet) + sheet.spacing_mm;
   const std::size_t listed = sheet.ids.size();
   for (int row = 0; row < sheet.rows; ++row) {
     for (int column = 0; column < sheet.columns; ++column) {
@@ -178,11 +184,12 @@ void Sheet::validate() const {
             "more than 0 and less than 0.8 of the pitch");
   }
   if (kind == SheetKind::charuco) {
-    require(marker_mm < 0.95 * pitch_mm, "marker_mm", marker_mm, "less than 0.95 of square_mm");
+    require(printed_marker_mm(*this) < 0.95 * pitch_mm, "marker_mm", marker_mm,
+            "a marker of less than 0.95 of square_mm with all that is printed of it");
   }
   if (kind == SheetKind::dots) {
     // A marker is read only with a white border of one of its eight cells.
-    require(0.625 * marker_mm + 0.5 * dot_mm <= pitch_mm, "marker_mm", marker_mm,
+    require(0.625 * printed_marker_mm(*this) + 0.5 * dot_mm <= pitch_mm, "marker_mm", marker_mm,
             "a marker whose white border (1/8 of it) clears the neighbouring dots");
   }
   if (kind == SheetKind::photomodeler) {
@@ -193,6 +200,10 @@ void Sheet::validate() const {
             static_cast<double>(ids.size()), "1 to columns x rows");
   }
   if (has_markers) validate_ids(*this);
+}
+
+double printed_marker_mm(const Sheet& sheet) {
+  return sheet.family.empty() ? 0 : sheet.marker_mm * printed_share(marker_family(sheet.family));
 }
 
 SheetGeometry sheet_geometry(const Sheet& sheet) {

@@ -32,7 +32,7 @@ struct Sheet {
   int columns = 0;              ///< tags, squares or dots per row
   int rows = 0;                 ///< rows of them
   double marker_mm = 0;         ///< edge of a marker's square
-  double spacing_mm = 0;        ///< white gap between markers (aprilgrid, markers)
+  double spacing_mm = 0;        ///< white gap between prints of markers (aprilgrid, markers)
   double pitch_mm = 0;          ///< edge of a chessboard square, or dot to dot
   double dot_mm = 0;            ///< diameter of a dot
   int first_id = 0;             ///< marker at the printed top left

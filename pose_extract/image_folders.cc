@@ -27,14 +27,20 @@ int format_rank(const fs::path& path) {
   switch (photograph_format(path)) {
     case PhotographFormat::jpeg:
       return 0;
-    case PhotographFormat::tiff:
+    case PhotographFormat::heif:
       return 1;
-    case PhotographFormat::png:
+    case PhotographFormat::tiff:
       return 2;
-    case PhotographFormat::nef:
+    case PhotographFormat::png:
       return 3;
-    case PhotographFormat::dng:
+    case PhotographFormat::bmp:
       return 4;
+    case PhotographFormat::nef:
+      return 5;
+    case PhotographFormat::other_raw:
+      return 6;
+    case PhotographFormat::dng:
+      return 7;
     case PhotographFormat::none:
       break;
   }
@@ -59,8 +65,8 @@ bool is_litter(const fs::path& path) {
 
 // Folders that tell formats apart, as cameras and RAW developers make them: no poses.
 bool is_format_folder(const fs::path& path) {
-  static const std::set<std::string> kNames{"raw",   "nef", "dng",  "jpg", "jpeg",
-                                            "jpegs", "tif", "tiff", "png"};
+  static const std::set<std::string> kNames{"raw",  "nef",   "dng", "cr2",  "arw", "raf", "jpg",
+                                            "jpeg", "jpegs", "tif", "tiff", "png", "bmp", "heic"};
   return kNames.count(lower(path.filename().string())) != 0;
 }
 
@@ -72,6 +78,7 @@ bool name_less(const fs::path& a, const fs::path& b) { return natural_less(a.str
 
 struct Folder {
   std::vector<fs::path> files;    // photographs directly in it
+  std::vector<fs::path> unread;   // pictures in a format that is not read
   std::vector<fs::path> folders;  // its sub-folders
 };
 
@@ -85,8 +92,11 @@ Folder read_folder(const fs::path& path) {
       folder.folders.push_back(entry.path());
     } else if (is_photograph_name(entry.path())) {
       folder.files.push_back(entry.path());
+    } else if (!unread_format_advice(entry.path()).empty()) {
+      folder.unread.push_back(entry.path());
     }
   }
+  std::sort(folder.unread.begin(), folder.unread.end(), name_less);
   std::sort(folder.files.begin(), folder.files.end(), name_less);
   std::sort(folder.folders.begin(), folder.folders.end(), name_less);
   return folder;
@@ -134,6 +144,7 @@ class Lister {
     const fs::path real = fs::canonical(path, error);
     if (error || !visited_.insert(real).second) return;  // links may lead in a circle
     const Folder folder = read_folder(path);
+    for (const fs::path& file : folder.unread) skip(file, unread_format_advice(file));
     for (const fs::path& file : folder.files) {
       if (is_thumbnail(file)) {
         skip(file, "a thumbnail by its name");
@@ -186,8 +197,9 @@ class Lister {
       if (format_rank(found.file) == format_rank(chosen.file)) {
         taken.push_back(found);
       } else {
-        skip(found.file, fmt::format("{} of {}, which is taken", format_rank(found.file) > 2 ? "RAW" : "copy",
-                                     name(chosen.file)));
+        skip(found.file,
+             fmt::format("{} of {}, which is taken", is_raw(photograph_format(found.file)) ? "RAW" : "copy",
+                         name(chosen.file)));
       }
     }
     files = std::move(taken);

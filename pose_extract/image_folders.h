@@ -42,7 +42,7 @@ struct ListingOptions {
 /// with those of its sub-folders that only tell cameras (options) or formats (raw, jpg, ...) apart; its id is
 /// the folder's name, or its path where two have the same name. A folder without sub-folders is one pose.
 /// Hidden files, thumbnails' folders and the litter of operating systems are passed over in silence. Of an
-/// exposure in several formats one is taken: JPEG, then TIFF, PNG, RAW. Photographs that lie beside pose
+/// exposure in several formats one is taken: JPEG, then HEIC, TIFF, PNG, BMP, RAW. Photographs beside pose
 /// folders are named as stray. A file of the table that does not exist is listed, for its status to say so.
 /// Throws InputError if the folder does not exist.
 [[nodiscard]] ImageListing list_images(const std::filesystem::path& folder, const ListingOptions& options);

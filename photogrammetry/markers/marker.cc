@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <functional>
 #include <map>
@@ -44,6 +45,8 @@ constexpr AprilTagFamily kAprilTagFamilies[] = {
     {"tagStandard52h13", tagStandard52h13_create, tagStandard52h13_destroy},
     {"tagCustom48h12", tagCustom48h12_create, tagCustom48h12_destroy},
 };
+
+constexpr const char* kDoubleBorder = "tag36h11_border2";
 
 struct ArucoDictionary {
   const char* name;
@@ -92,6 +95,27 @@ MarkerFamily april_tag_family(const AprilTagFamily& source) {
   return family;
 }
 
+// Kalibr's AprilGrid: the same data within one more ring of black.
+MarkerFamily double_border_family() {
+  const MarkerFamily& source = marker_family("tag36h11");
+  MarkerFamily family{kDoubleBorder, {}};
+  family.distance = source.distance;
+  for (const MarkerPattern& thin : source.patterns) {
+    const int cells = thin.cells + 2;
+    MarkerPattern pattern{cells, thin.square_cells + 2, {}};
+    for (int y = 0; y < cells; ++y) {
+      for (int x = 0; x < cells; ++x) {
+        const int ring = std::min({x, y, cells - 1 - x, cells - 1 - y});
+        const bool data = ring > 2;
+        const auto at = static_cast<std::size_t>((y - 1) * thin.cells + x - 1);
+        pattern.white.push_back(ring == 0 || (data && thin.white[at] != 0) ? 1 : 0);
+      }
+    }
+    family.patterns.push_back(std::move(pattern));
+  }
+  return family;
+}
+
 cv::aruco::Dictionary library_dictionary(const ArucoDictionary& source) {
 #if CV_VERSION_MAJOR > 4 || CV_VERSION_MINOR >= 7
   return cv::aruco::getPredefinedDictionary(source.id);
@@ -124,6 +148,7 @@ const std::vector<std::string>& marker_family_names() {
   static const std::vector<std::string> names = [] {
     std::vector<std::string> all;
     for (const auto& family : kAprilTagFamilies) all.emplace_back(family.name);
+    all.emplace_back(kDoubleBorder);
     for (const auto& dictionary : kArucoDictionaries) all.emplace_back(dictionary.name);
     return all;
   }();
@@ -131,18 +156,20 @@ const std::vector<std::string>& marker_family_names() {
 }
 
 const MarkerFamily& marker_family(std::string_view name) {
-  static std::mutex mutex;
+  static std::recursive_mutex mutex;  // one family is made from another
   static std::map<std::string, MarkerFamily, std::less<>> families;
-  const std::lock_guard<std::mutex> lock(mutex);
+  const std::lock_guard<std::recursive_mutex> lock(mutex);
   const auto known = families.find(name);
   if (known != families.end()) return known->second;
+  const auto add = [&](MarkerFamily family) -> const MarkerFamily& {
+    return families.emplace(std::string(name), std::move(family)).first->second;
+  };
+  if (name == kDoubleBorder) return add(double_border_family());
   for (const auto& family : kAprilTagFamilies) {
-    if (name == family.name)
-      return families.emplace(std::string(name), april_tag_family(family)).first->second;
+    if (name == family.name) return add(april_tag_family(family));
   }
   for (const auto& dictionary : kArucoDictionaries) {
-    if (name == dictionary.name)
-      return families.emplace(std::string(name), aruco_family(dictionary)).first->second;
+    if (name == dictionary.name) return add(aruco_family(dictionary));
   }
   throw InputError(fmt::format("marker family '{}' is not known; wanted one of {}", name,
                                fmt::join(marker_family_names(), ", ")));

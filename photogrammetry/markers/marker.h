@@ -18,8 +18,8 @@ struct MarkerPattern {
   std::vector<std::uint8_t> white;  ///< cells x cells, 1 white, 0 black
 };
 
-/// A family of markers: AprilTag's names (`tag36h11`, ...) and OpenCV's ArUco dictionaries (`DICT_4X4_50`,
-/// ...).
+/// A family of markers: AprilTag's names (`tag36h11`, ...), `tag36h11_border2` (Kalibr's AprilGrid: black
+/// borders of two cells) and OpenCV's ArUco dictionaries (`DICT_4X4_50`, ...).
 struct MarkerFamily {
   std::string name;
   std::vector<MarkerPattern> patterns;  ///< by id

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "photogrammetry/markers/fit_pixels.h"
+#include "photogrammetry/markers/printed_pattern.h"
 
 namespace hexcal {
 namespace {
@@ -136,6 +137,7 @@ MarkerDecoder::MarkerDecoder(const MarkerFamily& family, const std::vector<int>&
   }
   for (std::size_t id = 0; id < words.size(); ++id) {
     const int number = static_cast<int>(id);
+    if (same_when_turned(family.patterns[id])) continue;
     if (ids.empty() || std::find(ids.begin(), ids.end(), number) != ids.end())
       codes_.push_back({words[id], number});
   }

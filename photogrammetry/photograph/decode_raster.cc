@@ -2,6 +2,7 @@
 
 #include "photogrammetry/photograph/decoders.h"
 #include "photogrammetry/photograph/file_signature.h"
+#include "photogrammetry/photograph/linear_tone.h"
 #include "photogrammetry/photograph/raster_header.h"
 
 namespace hexcal {
@@ -9,12 +10,16 @@ namespace hexcal {
 DecodedImage decode_raster(std::string_view bytes) {
   DecodedImage image;
   const FileSignature signature = file_signature(bytes);
-  if (signature == FileSignature::other) {
-    image.reason = "neither JPEG, PNG nor TIFF";
-    return image;
+  RasterHeader header;
+  if (signature == FileSignature::png) {
+    header = read_png_header(bytes);
+  } else if (signature == FileSignature::tiff) {
+    header = read_tiff_header(bytes);
+  } else if (signature == FileSignature::bmp) {
+    header = read_bmp_header(bytes);
+  } else {
+    header.reason = "neither JPEG, PNG, TIFF, BMP nor HEIC";
   }
-  const RasterHeader header =
-      signature == FileSignature::png ? read_png_header(bytes) : read_tiff_header(bytes);
   if (header.status != PhotographStatus::ok) {
     image.status = header.status;
     image.reason = header.reason;
@@ -33,6 +38,7 @@ DecodedImage decode_raster(std::string_view bytes) {
     image.reason = "no image of 8 or 16 bit that can be decoded";
     return image;
   }
+  if (image.grey.depth() == CV_16U) image.tone = judged_tone(bytes, image.grey);
   image.status = PhotographStatus::ok;
   return image;
 }

@@ -1,6 +1,7 @@
 #include <libraw/libraw.h>
 
 #include <algorithm>
+#include <array>
 #include <memory>
 
 #include "photogrammetry/photograph/decoders.h"
@@ -27,6 +28,14 @@ void even_out_green(LibRaw& raw, cv::Mat& green) {
 }
 
 constexpr unsigned kMaxRawMegabytes = 640;
+
+// LibRaw shows pixels at the borders that the camera uses for demosaicing and leaves out of its JPEGs. The
+// size of the JPEG is that of the preview in the file where it is a whole one, or is known of the body.
+cv::Rect camera_crop(const LibRaw& raw, const cv::Size& shown) {
+  const auto& info = raw.imgdata.idata;
+  const auto& preview = raw.imgdata.thumbnail;
+  return jpeg_crop(info.make, info.model, {preview.twidth, preview.theight}, shown);
+}
 
 DecodedImage develop(std::string_view bytes) {
   DecodedImage image;
@@ -62,6 +71,11 @@ DecodedImage develop(std::string_view bytes) {
     image.status = PhotographStatus::too_large;
     return image;
   }
+  constexpr unsigned kXTrans = 9;  // LibRaw's code for Fujifilm's 6 x 6 mosaic
+  if (raw->imgdata.idata.filters == kXTrans || raw->imgdata.idata.filters == 0) {
+    image.reason = "its sensor has no Bayer mosaic: save the photograph as 16-bit TIFF or JPEG";
+    return image;
+  }
   if (failed(raw->unpack()) || failed(raw->dcraw_process())) return image;
   if (raw->imgdata.image == nullptr || sizes.iheight < 1 || sizes.iwidth < 1) {
     image.reason = "no picture in it";
@@ -73,16 +87,43 @@ DecodedImage develop(std::string_view bytes) {
     for (int x = 0; x < image.grey.cols; ++x) image.grey.at<std::uint16_t>(y, x) = row[x][1];
   }
   even_out_green(*raw, image.grey);
+  image.grey = image.grey(camera_crop(*raw, image.grey.size())).clone();
   image.status = PhotographStatus::ok;
   return image;
 }
 
 }  // namespace
 
+cv::Rect jpeg_crop(const std::string& make, const std::string& model, const cv::Size& preview,
+                   const cv::Size& shown) {
+  struct Body {
+    const char* make;
+    const char* model;
+    cv::Size shown, jpeg;
+  };
+  // Where the file holds no whole preview; sizes by LibRaw 0.20 and the maker's specification.
+  static const std::array kBodies{Body{"Nikon", "D3200", {6034, 4012}, {6016, 4000}}};
+  constexpr int kMostMargin = 64;
+  const auto fits = [&shown](const cv::Size& jpeg) {
+    return jpeg.width <= shown.width && jpeg.height <= shown.height &&
+           jpeg.width >= shown.width - kMostMargin && jpeg.height >= shown.height - kMostMargin;
+  };
+  cv::Size jpeg = shown;
+  if (fits(preview)) {
+    jpeg = preview;
+  } else {
+    for (const Body& body : kBodies) {
+      if (make == body.make && model == body.model && shown == body.shown) jpeg = body.jpeg;
+    }
+  }
+  return {(shown.width - jpeg.width) / 2, (shown.height - jpeg.height) / 2, jpeg.width, jpeg.height};
+}
+
 DecodedImage decode_raw_green(std::string_view bytes) {
   DecodedImage failed;
-  if (file_signature(bytes) != FileSignature::tiff) {
-    failed.reason = "neither NEF nor DNG";
+  const FileSignature signature = file_signature(bytes);
+  if (signature != FileSignature::tiff && signature != FileSignature::raf) {
+    failed.reason = "not a RAW file (NEF, DNG, CR2, ARW or RAF)";
     return failed;
   }
   try {

@@ -1,6 +1,7 @@
 #include "photogrammetry/photograph/photograph.h"
 
 #include <fstream>
+#include <utility>
 
 #include "photogrammetry/photograph/decoders.h"
 #include "photogrammetry/photograph/file_signature.h"
@@ -14,8 +15,13 @@ namespace {
 constexpr std::uintmax_t kMaxFileBytes = 1U << 29;
 
 DecodedImage decode(const std::filesystem::path& path, std::string_view bytes) {
-  if (file_signature(bytes) == FileSignature::jpeg) return decode_jpeg_luma(bytes);
+  const FileSignature signature = file_signature(bytes);
+  if (signature == FileSignature::jpeg) return decode_jpeg_luma(bytes);
+  if (signature == FileSignature::heif) return decode_heif_luma(bytes);
   if (is_raw(photograph_format(path))) return decode_raw_green(bytes);
+  if (std::string advice = unread_format_advice(path); !advice.empty()) {
+    return {PhotographStatus::unreadable, std::move(advice), {}, ToneCurve::srgb};
+  }
   return decode_raster(bytes);
 }
 

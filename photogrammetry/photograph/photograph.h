@@ -40,8 +40,8 @@ struct Photograph {
   std::string sha256;  ///< of the file, hexadecimal
 };
 
-/// Reads and decodes one file (JPEG, PNG, TIFF 8 and 16 bit, NEF, DNG). Never throws for a bad photograph:
-/// see status.
+/// Reads and decodes one file in any of the formats of photograph_format.h. Never throws for a bad
+/// photograph: see status.
 [[nodiscard]] Photograph read_photograph(const std::filesystem::path& path);
 
 /// Reads EXIF and the size only.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <map>
 #include <optional>
 
@@ -18,6 +19,12 @@ constexpr long long kAlwaysPixels = 4'000'000;  // that do no harm, however few 
 std::uint32_t big_endian_32(std::string_view bytes, std::size_t at) {
   std::uint32_t value = 0;
   for (std::size_t i = at; i < at + 4; ++i) value = value << 8 | static_cast<unsigned char>(bytes[i]);
+  return value;
+}
+
+std::uint32_t little_endian(std::string_view bytes, std::size_t at, std::size_t size) {
+  std::uint32_t value = 0;
+  for (std::size_t i = at + size; i-- > at;) value = value << 8 | static_cast<unsigned char>(bytes[i]);
   return value;
 }
 
@@ -112,6 +119,34 @@ RasterHeader read_png_header(std::string_view bytes) {
   header.width_px = big_endian_32(bytes, 16);
   header.height_px = big_endian_32(bytes, 20);
   judge_size(header, bytes.size());
+  return header;
+}
+
+// Windows' bitmap: 14 bytes of file header, then the picture's (40 bytes or more); negative height: from the
+// top.
+RasterHeader read_bmp_header(std::string_view bytes) {
+  RasterHeader header;
+  constexpr std::size_t kHeads = 54;
+  if (bytes.size() < kHeads || little_endian(bytes, 14, 4) < 40) {
+    header.reason = "a BMP without a whole header of Windows' kind";
+    return header;
+  }
+  header.width_px = static_cast<std::int32_t>(little_endian(bytes, 18, 4));
+  header.height_px = std::abs(static_cast<long long>(static_cast<std::int32_t>(little_endian(bytes, 22, 4))));
+  const std::uint32_t bits = little_endian(bytes, 28, 2);
+  const std::uint32_t compression = little_endian(bytes, 30, 4);
+  if ((bits != 8 && bits != 24 && bits != 32) || (compression != 0 && compression != 3)) {
+    header.reason = "a BMP of " + std::to_string(bits) + " bit, compression " + std::to_string(compression) +
+                    ", wanted 8, 24 or 32 bit without compression";
+    return header;
+  }
+  judge_size(header, bytes.size());
+  const long long row = (header.width_px * bits + 31) / 32 * 4;
+  const long long wanted = little_endian(bytes, 10, 4) + row * header.height_px;
+  if (header.status == PhotographStatus::ok && static_cast<long long>(bytes.size()) < wanted) {
+    header.status = PhotographStatus::truncated;
+    header.reason = "the BMP ends too early";
+  }
   return header;
 }
 

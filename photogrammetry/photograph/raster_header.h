@@ -7,7 +7,7 @@
 
 namespace hexcal {
 
-/// What the head of a PNG or TIFF claims, judged before a decoder believes it.
+/// What the head of a PNG, TIFF or BMP claims, judged before a decoder believes it.
 struct RasterHeader {
   PhotographStatus status = PhotographStatus::unreadable;
   std::string reason;  ///< why status is not ok, in words
@@ -19,6 +19,7 @@ struct RasterHeader {
 /// `size_fault` accepts, and strips or tiles no larger than the picture.
 [[nodiscard]] RasterHeader read_png_header(std::string_view bytes);
 [[nodiscard]] RasterHeader read_tiff_header(std::string_view bytes);
+[[nodiscard]] RasterHeader read_bmp_header(std::string_view bytes);
 
 /// Why a picture of this size in a file of so many bytes is not decoded: more pixels than cameras have, or
 /// more than any photograph packs into the file. Empty if it may be.

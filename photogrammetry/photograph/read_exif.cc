@@ -32,6 +32,11 @@ class ExifReader {
     return static_cast<double>(over) / under;
   }
 
+  [[nodiscard]] std::optional<double> positive(const char* key) const {
+    const auto value = number(key);
+    return value && *value > 0 ? value : std::nullopt;
+  }
+
   [[nodiscard]] std::optional<int> integer(const char* key) const {
     const auto entry = data_.findKey(Exiv2::ExifKey(key));
     if (entry == data_.end() || entry->count() == 0) return std::nullopt;
@@ -64,11 +69,11 @@ int size_px(std::int64_t told) {
   return told > 0 && told <= std::numeric_limits<int>::max() ? static_cast<int>(told) : 0;
 }
 
-PhotographInfo info_from(const Exiv2::Image& image) {
+PhotographInfo info_from(const Exiv2::ExifData& data, std::int64_t width_px, std::int64_t height_px) {
   PhotographInfo info;
-  info.width_px = size_px(image.pixelWidth());
-  info.height_px = size_px(image.pixelHeight());
-  const ExifReader exif(image.exifData());
+  info.width_px = size_px(width_px);
+  info.height_px = size_px(height_px);
+  const ExifReader exif(data);
   info.make = exif.text("Exif.Image.Make");
   info.model = exif.text("Exif.Image.Model");
   info.serial = exif.text("Exif.Nikon3.SerialNumber");
@@ -78,9 +83,10 @@ PhotographInfo info_from(const Exiv2::Image& image) {
   info.capture_time = exif.text("Exif.Photo.DateTimeOriginal");
   info.lens_id = exif.nikon_lens_integer("LensIDNumber");
   info.focus_distance_code = exif.nikon_lens_integer("FocusDistance");
-  info.focal_length_mm = exif.number("Exif.Photo.FocalLength");
-  info.f_number = exif.number("Exif.Photo.FNumber");
-  info.exposure_s = exif.number("Exif.Photo.ExposureTime");
+  // Adapted lenses without contacts, and some editors, write 0 for what they do not know.
+  info.focal_length_mm = exif.positive("Exif.Photo.FocalLength");
+  info.f_number = exif.positive("Exif.Photo.FNumber");
+  info.exposure_s = exif.positive("Exif.Photo.ExposureTime");
   info.iso = exif.integer("Exif.Photo.ISOSpeedRatings");
   if (const auto reduction = exif.integer("Exif.NikonVr.VibrationReduction")) {
     info.vibration_reduction = *reduction == 1;
@@ -91,17 +97,27 @@ PhotographInfo info_from(const Exiv2::Image& image) {
 }  // namespace
 
 PhotographInfo read_exif(std::string_view bytes) {
-  if (file_signature(bytes) == FileSignature::other) return {};
+  const FileSignature signature = file_signature(bytes);
+  if (signature == FileSignature::other) return {};
   static std::once_flag prepared;
   std::call_once(prepared, [] {
     Exiv2::LogMsg::setLevel(Exiv2::LogMsg::mute);
     Exiv2::XmpParser::initialize();  // not safe to leave to the first of several threads
   });
   try {
+    if (signature == FileSignature::heif) {  // not every build of Exiv2 reads its boxes
+      const HeifHead head = read_heif_head(bytes);
+      Exiv2::ExifData data;
+      if (!head.exif.empty()) {
+        Exiv2::ExifParser::decode(data, reinterpret_cast<const Exiv2::byte*>(head.exif.data()),
+                                  static_cast<std::uint32_t>(head.exif.size()));
+      }
+      return info_from(data, head.width_px, head.height_px);
+    }
     const auto image = Exiv2::ImageFactory::open(reinterpret_cast<const Exiv2::byte*>(bytes.data()),
                                                  static_cast<long>(bytes.size()));
     image->readMetadata();
-    return info_from(*image);
+    return info_from(image->exifData(), image->pixelWidth(), image->pixelHeight());
   } catch (const std::exception&) {  // Exiv2 throws its own and the standard library's on damaged files
     return {};
   }

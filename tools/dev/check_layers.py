@@ -26,7 +26,7 @@ ARROWS = {
     "tools/python": ["tools/campaign", "tools/synthetic", "tools/report"],
 }
 BANNED_NAMES = re.compile(r"(^|[_.-])(utils?|misc|common|helpers?)([_.-]|$)")
-PRIVATE_HEADERS = re.compile(r"<(ceres|pcl|apriltag|exiv2|libraw)/")
+PRIVATE_HEADERS = re.compile(r"<(ceres|pcl|apriltag|exiv2|libraw|libheif)/")
 TYPE = re.compile(r"^(?:struct|class|enum class)\s+(\w+)[^;{]*\{", re.MULTILINE)
 INCLUDE = re.compile(r'^\s*#\s*include\s+(?:"([^"]+)"|(<[^>]+>))')
 

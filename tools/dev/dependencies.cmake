@@ -37,6 +37,7 @@ hexcal_find(PkgConfig pkg-config)
 hexcal_find_pc(APRILTAG libapriltag-dev apriltag)
 hexcal_find_pc(EXIV2 libexiv2-dev exiv2)
 hexcal_find_pc(LIBRAW libraw-dev libraw)
+hexcal_find_pc(HEIF libheif-dev libheif)
 hexcal_find_pc(CAIRO libcairo2-dev cairo)
 hexcal_find_pc(PCL libpcl-dev pcl_sample_consensus)
 

@@ -48,7 +48,7 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SHLIBDEPS OFF)
 # What hexcal-config.cmake looks for and the libraries link.
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
     "libapriltag-dev, libcairo2-dev, libceres-dev, libeigen3-dev, libexiv2-dev, libfmt-dev, libjpeg-dev, \
-libopencv-dev, libpcl-dev, libraw-dev, libssl-dev, libtbb-dev, libyaml-cpp-dev, nlohmann-json3-dev, pkg-config")
+libopencv-dev, libheif-dev, libpcl-dev, libraw-dev, libssl-dev, libtbb-dev, libyaml-cpp-dev, nlohmann-json3-dev, pkg-config")
 if(HEXCAL_BUILD_PYTHON)
   math(EXPR python_next "${Python_VERSION_MINOR} + 1")
   list(APPEND CPACK_COMPONENTS_ALL python)

@@ -7,7 +7,7 @@ packages=(
   g++ cmake ninja-build ccache pkg-config git python3 clang-format
   # libraries
   libopencv-dev libceres-dev libboost-dev libeigen3-dev libapriltag-dev libpcl-dev libfmt-dev libcli11-dev libyaml-cpp-dev
-  nlohmann-json3-dev libexiv2-dev libraw-dev libcairo2-dev libtbb-dev libjpeg-dev libssl-dev libjs-three
+  nlohmann-json3-dev libexiv2-dev libraw-dev libheif-dev libcairo2-dev libtbb-dev libjpeg-dev libssl-dev libjs-three
   # Python module (left out where these are missing)
   pybind11-dev python3-dev python3-numpy
   # tests

@@ -74,8 +74,7 @@ std::vector<fs::path> photograph_paths(const std::vector<fs::path>& given) {
         found.push_back(entry.path());
     }
     if (found.empty()) {
-      throw InputError(
-          fmt::format("{}: holds no photograph (jpg, jpeg, png, tif, tiff, nef, dng)", path.string()));
+      throw InputError(fmt::format("{}: holds no photograph ({})", path.string(), photograph_endings()));
     }
     std::sort(found.begin(), found.end());
     out.insert(out.end(), found.begin(), found.end());

@@ -123,7 +123,8 @@ int run_template(const TemplateFlags& flags) {
   Sheet sheet = sheet_from(flags);
   set_grid(sheet, flags, options);
   std::vector<Sheet> sheets;
-  for (int i = 0; i < flags.sheets; ++i) {
+  if (sheet.kind == SheetKind::markers) sheets = sticker_pages(sheet, options);
+  for (int i = 0; i < flags.sheets && sheet.kind != SheetKind::markers; ++i) {
     sheets.push_back(sheet);
     sheet.first_id += static_cast<int>(sheet_geometry(sheet).markers.size());
     if (i + 1 < flags.sheets) sheet.validate();

@@ -7,6 +7,7 @@
 #include <map>
 #include <utility>
 
+#include "camera_calib/printed_marker.h"
 #include "photogrammetry/markers/marker.h"
 
 namespace hexcal {
@@ -89,10 +90,10 @@ void draw_ids(cairo_t* cr, const Sheet& sheet, const SheetGeometry& geometry) {
     const std::string text = sheet.kind == SheetKind::markers
                                  ? fmt::format("{}  {:g} mm", marker.id, marker.size_mm)
                                  : fmt::format("{}", marker.id);
-    const double y = -marker.centre_mm.y() + 0.5 * (marker.size_mm + sheet.spacing_mm);
+    const double y = -marker.centre_mm.y() + 0.5 * (printed_marker_mm(sheet) + sheet.spacing_mm);
     const bool marker_sheet = sheet.kind == SheetKind::markers;
-    draw_text(cr, marker.centre_mm.x() - 0.5 * marker.size_mm, marker_sheet ? y - 0.3 : y + 0.35 * height,
-              height, text);
+    draw_text(cr, marker.centre_mm.x() - 0.5 * printed_marker_mm(sheet),
+              marker_sheet ? y - 0.3 : y + 0.35 * height, height, text);
   }
   cairo_set_source_rgb(cr, 0, 0, 0);
 }
@@ -101,7 +102,7 @@ void draw_cut_lines(cairo_t* cr, const Sheet& sheet, const SheetGeometry& geomet
   if (sheet.kind != SheetKind::markers) return;
   cairo_set_source_rgb(cr, 0.6, 0.6, 0.6);
   cairo_set_line_width(cr, 0.1);
-  const double edge = sheet.marker_mm + sheet.spacing_mm;
+  const double edge = printed_marker_mm(sheet) + sheet.spacing_mm;
   for (const SheetMarker& marker : geometry.markers) {
     cairo_rectangle(cr, marker.centre_mm.x() - 0.5 * edge, -marker.centre_mm.y() - 0.5 * edge, edge, edge);
     cairo_stroke(cr);

@@ -178,6 +178,27 @@ std::pair<int, int> largest_grid(Sheet sheet, const TemplatePdfOptions& options)
   return {columns, rows};
 }
 
+std::vector<Sheet> sticker_pages(const Sheet& sheet, const TemplatePdfOptions& options) {
+  const auto [columns, rows] = largest_grid(sheet, options);
+  if (rows < 1 || columns < sheet.columns) {
+    throw InputError(
+        fmt::format("template: {} marker{} of {:g} mm beside one another do not fit on the page, "
+                    "wanted whole stickers: larger paper or fewer columns",
+                    sheet.columns, sheet.columns == 1 ? "" : "s", sheet.marker_mm));
+  }
+  const auto per_page = static_cast<std::size_t>(sheet.columns * rows);
+  std::vector<Sheet> pages;
+  for (std::size_t first = 0; first < sheet.ids.size(); first += per_page) {
+    const std::size_t last = std::min(first + per_page, sheet.ids.size());
+    Sheet page = sheet;
+    page.ids.assign(sheet.ids.begin() + static_cast<std::ptrdiff_t>(first),
+                    sheet.ids.begin() + static_cast<std::ptrdiff_t>(last));
+    page.rows = (static_cast<int>(page.ids.size()) + sheet.columns - 1) / sheet.columns;
+    pages.push_back(page);
+  }
+  return pages;
+}
+
 std::string template_pdf(const std::vector<Sheet>& sheets, const TemplatePdfOptions& options) {
   options.validate();
   std::string out;

@@ -44,6 +44,10 @@ struct TemplateTiles {
 /// Largest grid of columns x rows, others as in `sheet`, that stays on one page; zero if none does.
 [[nodiscard]] std::pair<int, int> largest_grid(Sheet sheet, const TemplatePdfOptions& options);
 
+/// Markers to be cut out (kind markers) on as many sheets as they need for each to stay whole on one page,
+/// `columns` beside one another. Throws InputError if not even one row fits.
+[[nodiscard]] std::vector<Sheet> sticker_pages(const Sheet& sheet, const TemplatePdfOptions& options);
+
 /// A vector PDF true to scale: the pattern, ids in small grey print, two 100 mm check rulers, a text line
 /// with kind and sizes, cut lines around markers, crosses where tiled pages meet. Same sheets, same bytes.
 [[nodiscard]] std::string template_pdf(const std::vector<Sheet>& sheets, const TemplatePdfOptions& options);
