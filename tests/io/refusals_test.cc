@@ -229,7 +229,7 @@ TEST(Refusals, OfMarkerObservations) {
   file.expect("marker,7", "maker,7", "found a record 'maker', wanted photograph or marker");
   file.expect("a.jpg", "\"a\"b.jpg", "text after a quote");
   file.expect(",1\nmarker", ",2\nmarker", "found 2, wanted 0 or 1");
-  file.expect("marker,7,", "marker,7,ok,", "found 52 fields in a marker record, wanted 51");
+  file.expect("marker,7,", "marker,7,ok,", "found 53 fields in a marker record, wanted 52");
 }
 
 TEST(Refusals, OfPosesAndReadings) {
@@ -312,11 +312,13 @@ TEST(Refusals, OfPosesAndReadings) {
 
 TEST(Refusals, OfAMeasuredNetwork) {
   const TemporaryFolder folder;
-  const std::string names = "photo,pose,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\n";
-  write_file_atomically(folder.path() / "photos.csv", names + "a.jpg,home,,,,,,\n");
+  const std::string names =
+      "photo,pose,status,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg,markers,rejected,rms_px\n";
+  write_file_atomically(folder.path() / "photos.csv",
+                        names + "a.jpg,home,disconnected: no fixed markers,,,,,,,0,0,0\n");
   EXPECT_THAT([&] { (void)read_measured_network(folder.path()); },
               ThrowsInputError("photos.csv: no photograph has a place"));
-  write_file_atomically(folder.path() / "photos.csv", names + "a.jpg,home,1,2,3,0,0,0\n");
+  write_file_atomically(folder.path() / "photos.csv", names + "a.jpg,home,ok,1,2,3,0,0,0,8,0,0.01\n");
   write_file_atomically(folder.path() / "markers.csv", "id,corner,frame,x_mm,y_mm,z_mm\n7,0,LG,1,2,3\n");
   EXPECT_THAT([&] { (void)read_measured_network(folder.path()); },
               ThrowsInputError("markers.csv: no marker of LG with four corners"));
