@@ -103,7 +103,8 @@ void judge_residuals(CampaignResult& result) {
 void judge_length(const char* kind, const MeasuredLength& length, CampaignResult& result) {
   if (!length.measured) return;
   const double off = length.length_mm - length.known.length_mm;
-  const double sigmas = std::abs(off) / std::hypot(length.sigma_mm, length.known.sigma_mm);
+  const double known_mm = length.known.sigma_mm > 0 ? length.known.sigma_mm : kUnstatedLengthSigmaMm;
+  const double sigmas = std::abs(off) / std::hypot(length.sigma_mm, known_mm);
   if (!(sigmas > kScaleDisagreementSigmas)) return;
   const std::string name = fmt::format("{} {}-{}", kind, length.known.a.id, length.known.b.id);
   const bool contradicts = sigmas > kContradictionSigmas;

@@ -16,6 +16,7 @@ namespace {
 constexpr double kFitsBetter = 3;
 constexpr double kLeverMm = 100;      // what a radian of rotation counts for
 constexpr double kLeastTurnDeg = 20;  // frames are turned by slips of 90 and 180 deg, machines by a few
+constexpr double kNearQuarterDeg = 15;
 constexpr std::size_t kFewestPoses = 3;
 // Two poses of which one's photographs lie in both folders differ by the measurement's noise only.
 constexpr double kSamePoseMm = 0.05;
@@ -84,13 +85,19 @@ bool judge_axes(const std::map<std::string, Pose>& commanded, CampaignResult& re
   const double turned =
       (m.positions_mm - turn * t.positions_mm).squaredNorm() + (m.arcs_mm - turn * t.arcs_mm).squaredNorm();
   const Eigen::AngleAxisd rotation(turn);
-  const Eigen::Vector3d axis = rotation.axis();
+  // Rounded as it is printed; plus zero, so that no -0.00 is.
+  const Eigen::Vector3d axis =
+      (rotation.axis() * 100).array().round().matrix() / 100 + Eigen::Vector3d::Zero();
   if (rotation.angle() * kDegPerRad > kLeastTurnDeg && kFitsBetter * kFitsBetter * turned < as_they_are) {
+    // Frames are exchanged by quarter turns; what is left beside one is the machine's own error.
+    const double angle_deg = rotation.angle() * kDegPerRad;
+    const double quarters_deg = 90 * std::round(angle_deg / 90);
     result.findings.emplace_back(
         fmt::format(
             "the measured poses are the commanded ones turned by {:.0f} deg about ({:.2f}, {:.2f}, {:.2f}): "
             "the axes of frame UG in campaign.yaml and those of the targets disagree",
-            rotation.angle() * kDegPerRad, axis.x(), axis.y(), axis.z()),
+            std::abs(angle_deg - quarters_deg) < kNearQuarterDeg ? quarters_deg : angle_deg, axis.x(),
+            axis.y(), axis.z()),
         "find out which of the two is right and correct frames.UG (its file of nominal coordinates) or the "
         "targets",
         Severity::bad);

@@ -76,7 +76,8 @@ TEST_F(CamerasByFolder, PhotographsObservationsAndWatchGiveTheSamePoses) {
   const CommandResult measured = run_hexcal({"measure", lab_.string()});
   ASSERT_EQ(measured.exit_code, 0) << measured.out << measured.err;
   const std::vector<PoseRecord> by_photographs = poses();
-  for (const PoseRecord& truth : read_pose_table(lab_ / "truth/poses.csv")) {
+  for (const PoseRecord& truth :
+       read_pose_table(fs::path(HEXCAL_SOURCE) / "samples/small_lab/truth/poses.csv")) {
     for (const PoseRecord& pose : by_photographs) {
       if (pose.id != truth.id) continue;
       EXPECT_LE((pose.pose->position_mm - truth.pose->position_mm).norm(), 0.05) << pose.id;

@@ -185,7 +185,7 @@ TEST_F(Messages, OfDetectedMarkers) {
   const std::string one = (kSample / "poses/p001/DSC_0004.jpg").string();
   put("no.jpg", "x");
   EXPECT_THAT(said({"detect", file("no.jpg"), one, "-o", file("o.txt"), "--ids", "3,100"}, 1),
-              AllOf(HasSubstr("no.jpg            0  unreadable: neither JPEG, PNG nor TIFF\n"),
+              AllOf(HasSubstr("no.jpg            0  unreadable: neither JPEG, PNG, TIFF, BMP nor HEIC\n"),
                     EndsWith("2 photographs, 2 markers in " + file("o.txt") +
                              "\nnext: hexcal measure CAMPAIGN --observations " + file("o.txt") + "\n")));
 }

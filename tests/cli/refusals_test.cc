@@ -87,7 +87,7 @@ TEST_F(CommandRefusals, OfPhotographsAndCameras) {
          "--relative-to: found " + file("empty") + ", wanted a folder above");
   expect({"measure", lab, "--group-by-time", "0"}, "--group-by-time: found 0, wanted more than 0");
   expect({"camera", file("empty"), "--template", lab + "/sheet.yaml", "-o", file("c.yaml")},
-         "empty: holds no photograph (jpg, jpeg, png, tif, tiff, nef, dng)");
+         "empty: holds no photograph (jpg, jpeg, png, tif, tiff, bmp, heic, heif, nef, dng, cr2, arw, raf)");
   expect({"camera", file("none"), "--template", lab + "/sheet.yaml", "-o", file("c.yaml")},
          "none: no such file or folder");
   expect({"camera"}, "IMAGES: wanted photographs or a folder of them");

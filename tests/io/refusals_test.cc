@@ -312,13 +312,11 @@ TEST(Refusals, OfPosesAndReadings) {
 
 TEST(Refusals, OfAMeasuredNetwork) {
   const TemporaryFolder folder;
-  const std::string names =
-      "photo,pose,status,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg,markers,rejected,rms_px\n";
-  write_file_atomically(folder.path() / "photos.csv",
-                        names + "a.jpg,home,disconnected: no fixed markers,,,,,,,0,0,0\n");
+  const std::string names = "photo,pose,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\n";
+  write_file_atomically(folder.path() / "photos.csv", names + "a.jpg,home,,,,,,\n");
   EXPECT_THAT([&] { (void)read_measured_network(folder.path()); },
               ThrowsInputError("photos.csv: no photograph has a place"));
-  write_file_atomically(folder.path() / "photos.csv", names + "a.jpg,home,ok,1,2,3,0,0,0,8,0,0.01\n");
+  write_file_atomically(folder.path() / "photos.csv", names + "a.jpg,home,1,2,3,0,0,0\n");
   write_file_atomically(folder.path() / "markers.csv", "id,corner,frame,x_mm,y_mm,z_mm\n7,0,LG,1,2,3\n");
   EXPECT_THAT([&] { (void)read_measured_network(folder.path()); },
               ThrowsInputError("markers.csv: no marker of LG with four corners"));

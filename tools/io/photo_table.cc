@@ -49,14 +49,20 @@ std::string format_photo_table(const std::string& head, const CampaignObservatio
 std::vector<PhotoRecord> read_photo_table(const std::filesystem::path& path) {
   const CsvTable table = CsvTable::read(path);
   std::vector<std::string> required(kPoseColumns.begin(), kPoseColumns.end());
-  required.insert(required.end(), {"photo", "pose", "status", "markers", "rejected", "rms_px"});
+  required.insert(required.end(), {"photo", "pose"});
   table.require_columns(required);
+  const auto count = [&table](std::size_t row, const char* column) {
+    return table.has_column(column) ? table.integer(row, column) : 0;
+  };
   std::vector<PhotoRecord> records;
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    PhotoRecord record{table.text(row, "photo"),      table.text(row, "pose"),
-                       table.text(row, "status"),     std::nullopt,
-                       table.integer(row, "markers"), table.integer(row, "rejected"),
-                       table.number(row, "rms_px")};
+    PhotoRecord record{table.text(row, "photo"),
+                       table.text(row, "pose"),
+                       table.has_column("status") ? table.text(row, "status") : std::string(),
+                       std::nullopt,
+                       count(row, "markers"),
+                       count(row, "rejected"),
+                       table.has_column("rms_px") ? table.number(row, "rms_px") : 0.0};
     if (table.optional_number(row, kPoseColumns[0])) {
       Vector6d v;
       for (std::size_t i = 0; i < 6; ++i)
