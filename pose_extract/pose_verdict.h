@@ -19,8 +19,8 @@ inline constexpr double kContradictionSigmas = 4;
 /// A length whose sigma nobody stated counts as read with a calliper.
 inline constexpr double kUnstatedLengthSigmaMm = 0.02;
 /// Residuals over what the photographs promise. The corners' own sigmas cover what a camera does to its
-/// pictures (a real sharpened set: 0.64, renders: 1.0), so that more is the model's: a lens of another zoom
-/// setting leaves 1.85 at 0.08 px, where freed corners take up most of it. Beyond the first it is said,
+/// pictures (two halves of a real board: 0.64, renders: 1.0), so that more is the model's: a lens of another
+/// zoom setting leaves 1.85 at 0.08 px, where freed corners take up most of it. Beyond the first it is said,
 /// beyond the second something is wrong with the whole, and its poses are suspect.
 inline constexpr double kNoisySigma0 = 1.5;
 inline constexpr double kSuspectSigma0 = 1.75;

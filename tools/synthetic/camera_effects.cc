@@ -13,14 +13,15 @@ void check_effect(const char* key, double value, double low, double high) {
   }
 }
 
-}  // namespace
-
+// The tone curve that darktable measured for Nikon's four-digit bodies (D3200 among them).
 const std::vector<std::array<double, 2>>& nikon_tone_curve() {
   // darktable, src/iop/basecurve.c, preset "nikon like alternate" for the models "NIKON D____".
   static const std::vector<std::array<double, 2>> nodes{
       {0, 0}, {0.012097, 0.007322}, {0.072581, 0.130742}, {0.310484, 0.729291}, {0.611321, 0.951613}, {1, 1}};
   return nodes;
 }
+
+}  // namespace
 
 const std::array<double, 9>& d3200_colour_matrix() {
   // dcraw.c, adobe_coeff(), "Nikon D3200", in units of 1/10000.

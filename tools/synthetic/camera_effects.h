@@ -84,9 +84,6 @@ struct CameraEffects {
 /// values.
 [[nodiscard]] CameraEffects d3200_effects();
 
-/// The tone curve that darktable measured for Nikon's four-digit bodies (D3200 among them).
-[[nodiscard]] const std::vector<std::array<double, 2>>& nikon_tone_curve();
-
 /// Nikon D3200, XYZ to camera, as in dcraw and LibRaw from Adobe's DNG converter.
 [[nodiscard]] const std::array<double, 9>& d3200_colour_matrix();
 
