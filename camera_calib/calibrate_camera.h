@@ -30,7 +30,7 @@ struct ModelTrial {
   bool chosen = false;
 };
 
-enum class CalibrationStatus { no_sheet, too_few_photographs, no_solution, ok };
+enum class CalibrationStatus { no_sheet, other_sheet, too_few_photographs, no_solution, ok };
 
 struct CameraCalibration {
   CalibrationStatus status = CalibrationStatus::no_sheet;

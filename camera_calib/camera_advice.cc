@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "camera_calib/marker_size.h"
+#include "camera_calib/printed_marker.h"
 
 namespace hexcal {
 namespace {
@@ -18,7 +19,9 @@ constexpr double kGoodCorner = 0.1;
 constexpr double kUsableCorner = 0.5;
 constexpr double kBlurred = 1.6;
 constexpr double kFrontalDeg = 10;
-constexpr double kDisagreeing = 3;  // times their noise
+constexpr double kSmallSizeError = 0.002;  // of a tag's size for its spacing
+constexpr double kInkSizeError = 0.01;     // ink spreads by some 0.05 mm at each edge of a tag
+constexpr double kDisagreeing = 3;         // times their noise
 
 class Advisor {
  public:
@@ -38,6 +41,7 @@ class Advisor {
     photographs();
     fit();
     sheets();
+    ambiguity();
     uncertainty();
     std::stable_sort(out_.begin(), out_.end(),
                      [](const Advice& a, const Advice& b) { return a.level > b.level; });
@@ -164,14 +168,44 @@ class Advisor {
       const std::string which = sheets_.size() > 1 ? fmt::format("sheet {}", s + 1) : "the sheet";
       shape_words(sheets_[s], shape, which);
       if (const auto size = marker_size_error(sheets_[s], static_cast<int>(s), calibration_.fit.adjustment)) {
-        if (std::abs(size->relative) > 0.002 && std::abs(size->relative) > 5 * size->sigma) {
-          add(AdviceLevel::usable,
-              fmt::format("the tags of {} are {:.2f} % {} for their spacing than the template says: check "
-                          "tag size and "
-                          "gap in sheet.yaml",
-                          which, 100 * std::abs(size->relative), size->relative > 0 ? "larger" : "smaller"));
+        if (std::abs(size->relative) > kSmallSizeError && std::abs(size->relative) > 5 * size->sigma) {
+          size_words(sheets_[s], size->relative, which);
         }
       }
+    }
+  }
+
+  // Beyond what ink does to an edge it is a number of the description that is wrong, and which distances are
+  // the right ones, and so the camera's focal length and the sheet's shape, is not known.
+  void size_words(const Sheet& sheet, double relative, const std::string& which) {
+    const bool wrong_number = std::abs(relative) > kInkSizeError;
+    std::string instruction = "measure tag size and gap on the print";
+    if (wrong_number && sheet.spacing_mm > 0) {
+      const double printed = printed_marker_mm(sheet);
+      instruction = fmt::format(
+          "with tags of {:g} mm the gap is {:.2f} mm, sheet.yaml says {:g}; measure both on the print and "
+          "write "
+          "them into it",
+          sheet.marker_mm, (printed + sheet.spacing_mm) / (1 + relative) - printed, sheet.spacing_mm);
+    } else if (wrong_number) {
+      instruction = fmt::format(
+          "sheet.yaml says {:g} mm, {:.2f} mm fits the pitch; measure both on the print and "
+          "write them into it",
+          sheet.marker_mm, sheet.marker_mm * (1 + relative));
+    }
+    add(wrong_number ? AdviceLevel::retake : AdviceLevel::usable,
+        fmt::format("the tags of {} are {:.2f} % {} for their spacing than the template says: {}", which,
+                    100 * std::abs(relative), relative > 0 ? "larger" : "smaller", instruction));
+  }
+
+  void ambiguity() {
+    for (const Sheet& sheet : sheets_) {
+      if (sheet.kind != SheetKind::chessboard || (sheet.columns + sheet.rows) % 2 != 0) continue;
+      add(AdviceLevel::note,
+          fmt::format(
+              "a chessboard of {} x {} squares looks the same upside down: the camera is right, but a pose "
+              "of --poses may be turned by 180 degrees; one odd and one even number are not ambiguous",
+              sheet.columns, sheet.rows));
     }
   }
 

@@ -267,6 +267,7 @@ void detect_family(const cv::Mat& grey, ToneCurve tone, const std::vector<Sheet>
   }
   for (const MarkerObservation& marker :
        detect_markers(grey, tone, marker_family(family), {{}, rough_look()})) {
+    out.markers.push_back({family, marker.id, marker.corners_px});
     const auto place = places.find(marker.id);
     if (place == places.end()) {
       if (marker.status == MarkerStatus::ok) out.foreign_ids.push_back(marker.id);

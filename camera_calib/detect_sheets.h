@@ -20,9 +20,10 @@ namespace hexcal {
 
 struct SheetDetection {
   std::vector<FeatureObservation>
-      features;                  ///< ordered by sheet and point; with a status other than ok if unusable
-  std::vector<int> foreign_ids;  ///< ids read that stand on none of the sheets
-  std::string reason;            ///< why nothing usable was found
+      features;                     ///< ordered by sheet and point; with a status other than ok if unusable
+  std::vector<int> foreign_ids;     ///< ids read that stand on none of the sheets
+  std::vector<MarkerRead> markers;  ///< all that were read of the sheets' families
+  std::string reason;               ///< why nothing usable was found
 };
 
 /// Finds all sheets in a photograph. Sheets with markers may be seen in part and together; a chessboard must

@@ -11,6 +11,7 @@
 #include "camera_calib/bent_markers.h"
 #include "camera_calib/detect_sheets.h"
 #include "camera_calib/robust_fit.h"
+#include "camera_calib/sheet_slip.h"
 
 namespace hexcal {
 namespace {
@@ -52,6 +53,7 @@ SheetPhotograph measure(const fs::path& path, const std::vector<Sheet>& sheets, 
   out.info.height_px = photograph.grey.rows;
   SheetDetection detection = detect_sheets(photograph.grey, photograph.tone, sheets);
   out.features = std::move(detection.features);
+  out.markers = std::move(detection.markers);
   out.reason = detection.reason;
   if (!detection.foreign_ids.empty() && detection.foreign_ids.size() * 4 > out.features.size()) {
     const auto [least, most] =
@@ -173,6 +175,13 @@ MeasuredCamera measure_camera(const std::vector<fs::path>& paths, const std::vec
     if (photograph.status == PhotographStatus::ok) pixels.keep(i, std::move(photograph));
     if (on_photograph) on_photograph();
   });
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    const auto slip = sheet_slip(sheets, s, out.photographs);
+    if (!slip) continue;
+    out.calibration.status = CalibrationStatus::other_sheet;
+    out.calibration.reason = *slip;
+    return out;
+  }
   leave_out_other_settings(out.photographs);
   out.calibration = rough_calibration(sheets, out.photographs, options);
   if (out.calibration.status != CalibrationStatus::ok) return out;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,13 @@ struct FeatureObservation {
   [[nodiscard]] int points() const { return static_cast<int>(px.size()) / 2; }
 };
 
+/// A marker as it was read: its id and where its four corners lie, whatever became of its measurement.
+struct MarkerRead {
+  std::string family;
+  int id = -1;
+  std::array<Eigen::Vector2d, 4> corners_px;
+};
+
 /// A photograph of sheets without its pixels.
 struct SheetPhotograph {
   std::string name;
@@ -34,6 +42,7 @@ struct SheetPhotograph {
   std::string reason;  ///< why status is not ok, or why no sheet was found
   PhotographInfo info;
   std::vector<FeatureObservation> features;
+  std::vector<MarkerRead> markers;  ///< all that were read of the sheets' families
 };
 
 }  // namespace hexcal
