@@ -1,10 +1,10 @@
 #include "photogrammetry/photograph/photograph.h"
 
-#include <fstream>
 #include <utility>
 
 #include "photogrammetry/photograph/decoders.h"
 #include "photogrammetry/photograph/file_signature.h"
+#include "photogrammetry/photograph/input_file.h"
 #include "photogrammetry/photograph/photograph_file.h"
 #include "photogrammetry/photograph/photograph_format.h"
 #include "photogrammetry/photograph/sha256.h"
@@ -36,18 +36,16 @@ PhotographFile read_photograph_file(const std::filesystem::path& path) {
     file.bytes.clear();
     return file;
   };
-  std::error_code error;
-  if (!std::filesystem::exists(path, error)) return failed(PhotographStatus::missing, "no such file");
-  if (!std::filesystem::is_regular_file(path, error))
-    return failed(PhotographStatus::unreadable, "not a file");
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (error) return failed(PhotographStatus::unreadable, error.message());
+  InputFile in(path);
+  if (!in.exists()) return failed(PhotographStatus::missing, "no such file");
+  if (in.is_pipe()) return failed(PhotographStatus::unreadable, "is a pipe, wanted a file");
+  if (!in.failure().empty()) return failed(PhotographStatus::unreadable, in.failure());
+  const std::uintmax_t size = in.size();
   if (size == 0) return failed(PhotographStatus::empty, "the file has no content");
   if (size > kMaxFileBytes) return failed(PhotographStatus::too_large, std::to_string(size) + " bytes");
-  std::ifstream in(path, std::ios::binary);
   file.bytes.resize(size);
-  if (!in || !in.read(file.bytes.data(), static_cast<std::streamsize>(size))) {
-    return failed(PhotographStatus::unreadable, "cannot be read");
+  if (in.read(file.bytes.data(), size) != size) {
+    return failed(PhotographStatus::unreadable, in.failure().empty() ? "became shorter" : in.failure());
   }
   file.status = PhotographStatus::ok;
   file.sha256 = sha256_hex(file.bytes);

@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include <fstream>
 #include <opencv2/core.hpp>
@@ -213,9 +214,19 @@ TEST(HostileFiles, ATableWithoutLinesOrOfManyColumnsIsRefusedAtOnce) {
   EXPECT_LT(processor_seconds() - start, kPatienceS);
 }
 
-TEST(HostileFiles, ADeviceHasAnEnd) {
-  EXPECT_THROW((void)read_file("/dev/zero"), InputError);
-  EXPECT_EQ(read_file("/dev/null"), "");
+TEST(HostileFiles, WhatIsNoFileIsNotOpened) {
+  const TemporaryFolder folder;
+  const auto refuses = [](const fs::path& path, const std::string& words) {
+    EXPECT_THAT([&path] { (void)read_file(path); }, ThrowsInputError(words)) << path;
+    EXPECT_NE(read_photograph(path).status, PhotographStatus::ok) << path;
+  };
+  refuses("/dev/zero", "is a device, wanted a file");
+  refuses("/dev/null", "is a device, wanted a file");
+  refuses("/proc/version", "belongs to the kernel, wanted a file");
+  fs::create_symlink("/proc/kmsg", folder.path() / "log.csv");  // a regular file, it says, and waits for news
+  refuses(folder.path() / "log.csv", "belongs to the kernel, wanted a file");
+  ASSERT_EQ(::mkfifo((folder.path() / "pipe.csv").c_str(), 0600), 0);
+  refuses(folder.path() / "pipe.csv", "is a named pipe, wanted a file");
 }
 
 }  // namespace

@@ -144,7 +144,7 @@ TEST_F(WithoutRights, APhotographThatMayNotBeReadHasAStatus) {
   lab_.put(photograph, contents(photograph));
   fs::permissions(photograph, fs::perms::none);
   EXPECT_EQ(measure(), 1) << contents(err_);
-  EXPECT_THAT(contents(results_ / "photos.csv"), HasSubstr("cannot be read"));
+  EXPECT_THAT(contents(results_ / "photos.csv"), HasSubstr("cannot read: Permission denied"));
 }
 
 TEST_F(HostileFolders, APhotographThatIsRewrittenWhileItIsRead) {

@@ -87,7 +87,7 @@ class Victim:
         self.took = time.monotonic() - start
         self.new = files_of(self.lab)
         # Files it leaves alone are inputs; of the others there was something else before.
-        self.old = {name: OLD + data if data != self.before.get(name) else data for name, data in self.new.items()}
+        self.old = {name: data + OLD if data != self.before.get(name) else data for name, data in self.new.items()}
         if self.name == "watch":  # it takes up what it finds
             self.old = self.before
 

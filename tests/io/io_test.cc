@@ -8,6 +8,7 @@
 #include "tests/support/temporary_folder.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/csv_table.h"
+#include "tools/io/output_file.h"
 #include "tools/io/pose_table.h"
 #include "tools/io/yaml_map.h"
 
@@ -163,6 +164,79 @@ TEST(LegTable, RoundTrip) {
   EXPECT_LE((*back[0].readings - *leg.readings).norm(), 1e-6);
   EXPECT_EQ(back[1].status, "leg 3 too long");
   EXPECT_FALSE(back[1].readings.has_value());
+}
+
+// Only in this test: a library's caller knows what it writes over.
+class GuardedOutput : public ::testing::Test {
+ protected:
+  GuardedOutput() { allow_overwriting(Overwrite::own_results); }
+  ~GuardedOutput() override { allow_overwriting(Overwrite::any_file); }
+
+  void put(const fs::path& path, const std::string& text) const {
+    fs::create_directories((folder_.path() / path).parent_path());
+    std::ofstream(folder_.path() / path) << text;
+  }
+  void refuses(const fs::path& path, const std::string& text, const std::string& words) const {
+    const std::string before = contents(folder_.path() / path);
+    EXPECT_THAT([&] { write_file_atomically(folder_.path() / path, text); }, ThrowsInputError(words)) << path;
+    EXPECT_EQ(contents(folder_.path() / path), before);
+  }
+  void writes(const fs::path& path, const std::string& text) const {
+    EXPECT_NO_THROW(write_file_atomically(folder_.path() / path, text)) << path;
+    EXPECT_EQ(contents(folder_.path() / path), text) << path;
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(GuardedOutput, AnInputIsNotWrittenOverUnderAnyName) {
+  put("notes.txt", "read\n");
+  (void)read_file(folder_.path() / "notes.txt");
+  fs::create_symlink("notes.txt", folder_.path() / "link.txt");
+  fs::create_hard_link(folder_.path() / "notes.txt", folder_.path() / "hard.txt");
+  fs::create_directory(folder_.path() / "down");
+  for (const char* name : {"notes.txt", "link.txt", "hard.txt", "down/../notes.txt"})
+    refuses(name, "new\n", "was read by this command; wanted another name, or --force");
+  // What took an input's place is not the input, though it may have its inode.
+  fs::rename(folder_.path() / "notes.txt", folder_.path() / "old.txt");
+  put("notes.txt", "another\n");
+  writes("notes.txt", "new\n");
+  put("kept.json", "{}");
+  (void)read_file(folder_.path() / "kept.json", ReadFor::own_result);
+  writes("kept.json", "{1}");
+}
+
+TEST_F(GuardedOutput, APhotographOrAUsersTableIsNotWrittenOver) {
+  const std::string legs = "# hexcal 1.2.3  legs  a.csv sha256:0\npose,q1\n";
+  put("a.JPG", "whatever it is");
+  put("photograph", "\xFF\xD8\xFF\xE0");
+  put("user.csv", "pose,q1\na,1\n");
+  put("user.yaml", "# made for hexcal\ncamera: a\n");
+  put("poses.csv", "# hexcal 1.2.3  measure\npose,x_mm\n");
+  put("legs.csv", "# hexcal 1.0.0  legs\npose,old\n");
+  put("simulated.csv", "# hexcal 1.2.3  simulate\npose,q1\na,2\n");
+  put("results/user.csv", "pose,q1\na,1\n");
+  refuses("a.JPG", legs, "is a photograph");
+  refuses("photograph", legs, "is a photograph");
+  refuses("user.csv", legs, "is there already and hexcal did not write it");
+  refuses("user.yaml", legs, "is there already and hexcal did not write it");
+  refuses("poses.csv", legs, "another file than this one (hexcal measure wrote it)");
+  writes("legs.csv", legs);       // written by the same command
+  writes("simulated.csv", legs);  // the same kind of table
+  writes("results/user.csv", legs);
+  allow_overwriting(Overwrite::any_file);
+  writes("user.csv", legs);
+  EXPECT_THAT([] { write_file_atomically("/dev/null", ""); }, ThrowsInputError("is a device or a pipe"));
+}
+
+TEST_F(GuardedOutput, TwoResultsOfOneName) {
+  const fs::path path = folder_.path() / "a.txt";
+  EXPECT_THAT(
+      [&] {
+        write_files_atomically({{path, "1"}, {folder_.path() / "." / "a.txt", "2"}});
+      },
+      ThrowsInputError("a.txt: two results would go to this file"));
+  EXPECT_FALSE(fs::exists(path));
 }
 
 }  // namespace

@@ -359,9 +359,9 @@ TEST(Refusals, OfFilesThatCannotBeReadOrWritten) {
   transform.columns = {"q1"};
   transform.row = [](const StreamedRow&, std::string&) { return true; };
   EXPECT_THAT([&] { (void)stream_rows(folder.path() / "file", inside, "#", transform, 1); },
-              ThrowsInputError("out.csv: cannot write: Not a directory"));
-  EXPECT_THAT([] { (void)read_file("/proc/self/mem"); },  // opens, and has nothing at address 0
-              ThrowsInputError("/proc/self/mem: cannot read: "));
+              ThrowsInputError("file: cannot create: Not a directory"));
+  EXPECT_THAT([] { (void)read_file("/proc/self/mem"); },
+              ThrowsInputError("/proc/self/mem: belongs to the kernel"));
   fs::create_directory(folder.path() / "elsewhere");
   fs::create_directory_symlink("elsewhere", folder.path() / "results");
   EXPECT_THAT([&] { refuse_linked_folders(folder.path() / "results"); },

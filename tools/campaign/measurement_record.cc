@@ -38,11 +38,11 @@ std::string circumstances(const MeasureRequest& request, const OpenCampaign& ope
 }
 
 // SHA-256 of a file's content; empty if it cannot be read (whoever needs the content says why).
-std::string hash_if_readable(const fs::path& path) {
+std::string hash_if_readable(const fs::path& path, ReadFor purpose) {
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return {};
   try {
-    return sha256_hex(read_file(path));
+    return sha256_hex(read_file(path, purpose));
   } catch (const InputError&) {  // no right to read it, or it is gone since
     return {};
   }
@@ -58,18 +58,18 @@ std::vector<fs::path> files_read(const MeasureRequest& request, const OpenCampai
   return files;
 }
 
-std::vector<FileHash> hashes_of(const std::vector<fs::path>& files) {
+std::vector<FileHash> hashes_of(const std::vector<fs::path>& files, ReadFor purpose) {
   std::vector<FileHash> hashes;
-  for (const fs::path& file : files) hashes.emplace_back(file.string(), hash_if_readable(file));
+  for (const fs::path& file : files) hashes.emplace_back(file.string(), hash_if_readable(file, purpose));
   return hashes;
 }
 
-bool all_unchanged(const std::vector<FileHash>& files, int threads) {
+bool all_unchanged(const std::vector<FileHash>& files, ReadFor purpose, int threads) {
   std::vector<char> same(files.size(), 0);
   tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
   arena.execute([&] {
     tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) {
-      same[i] = hash_if_readable(files[i].first) == files[i].second ? 1 : 0;
+      same[i] = hash_if_readable(files[i].first, purpose) == files[i].second ? 1 : 0;
     });
   });
   return std::find(same.begin(), same.end(), 0) == same.end();
@@ -82,17 +82,18 @@ std::optional<MeasurementAnswer> unchanged_measurement(const MeasureRequest& req
   const fs::path path = record_file(open);
   if (!request.cache || !fs::exists(path)) return std::nullopt;
   try {
-    const auto record = nlohmann::json::parse(read_file(path));
+    const auto record = nlohmann::json::parse(read_file(path, ReadFor::own_result));
     if (record.at("circumstances").get<std::string>() != circumstances(request, open)) return std::nullopt;
     const auto read = record.at("read").get<std::vector<FileHash>>();
-    if (read != hashes_of(files_read(request, open))) return std::nullopt;
+    if (read != hashes_of(files_read(request, open), ReadFor::input)) return std::nullopt;
     MeasurementAnswer answer;
     answer.text = record.at("text").get<std::string>();
     answer.exit_code = record.at("exit_code").get<int>();
     const auto written = record.at("written").get<std::vector<FileHash>>();
     for (const FileHash& file : written) answer.written.emplace_back(file.first);
-    if (!all_unchanged(written, request.threads) ||
-        !all_unchanged(record.at("photographs").get<std::vector<FileHash>>(), request.threads)) {
+    if (!all_unchanged(written, ReadFor::own_result, request.threads) ||
+        !all_unchanged(record.at("photographs").get<std::vector<FileHash>>(), ReadFor::input,
+                       request.threads)) {
       return std::nullopt;
     }
     return answer;
@@ -114,9 +115,9 @@ void keep_measurement(const MeasureRequest& request, const OpenCampaign& open,
     photographs.emplace_back(open.listing.images[i].path.string(), was_empty ? sha256_hex("") : seen.sha256);
   }
   const nlohmann::ordered_json record{{"circumstances", circumstances(request, open)},
-                                      {"read", hashes_of(files_read(request, open))},
+                                      {"read", hashes_of(files_read(request, open), ReadFor::input)},
                                       {"photographs", photographs},
-                                      {"written", hashes_of(answer.written)},
+                                      {"written", hashes_of(answer.written, ReadFor::own_result)},
                                       {"exit_code", answer.exit_code},
                                       {"text", answer.text}};
   write_file_atomically(record_file(open), json_text(record, 1), Keep::unless_power_fails);

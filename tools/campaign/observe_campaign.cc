@@ -37,7 +37,7 @@ fs::path cache_file(const OpenCampaign& open, const std::string& photograph_sha2
 std::optional<PhotographObservations> cached(const fs::path& file) {
   if (!fs::exists(file)) return std::nullopt;
   try {
-    DetectionSet set = read_observations(file);
+    DetectionSet set = read_observations(file, ReadFor::own_result);
     if (set.photographs.size() == 1) return std::move(set.photographs.front());
   } catch (const InputError&) {
     // A damaged entry is made anew.

@@ -145,9 +145,11 @@ int compare(const CameraFlags& flags) {
   return kDone;
 }
 
-// Writes everything asked for and returns the names.
-std::vector<std::string> write_files(const CameraFlags& flags, const std::vector<Sheet>& sheets,
-                                     const MeasuredCamera& measured, const CameraReport& report) {
+using NamedText = std::pair<fs::path, std::string>;
+
+// Everything asked for but the page.
+std::vector<NamedText> files_of(const CameraFlags& flags, const std::vector<Sheet>& sheets,
+                                const MeasuredCamera& measured, const CameraReport& report) {
   const CalibratedCamera camera{measured.calibration.fit.adjustment.state.camera, report.covariance,
                                 measured.setting, report.quality};
   const std::string head = provenance_line(kVersion, "camera", flags.templates);
@@ -155,10 +157,9 @@ std::vector<std::string> write_files(const CameraFlags& flags, const std::vector
   if (!flags.output.empty()) cameras.push_back(flags.output);
   if (!flags.library.empty())
     cameras.push_back(flags.library / (setting_file_stem(measured.setting) + ".yaml"));
-  std::vector<std::string> written;
-  const auto write = [&written](const fs::path& path, const std::string& text) {
-    write_file_atomically(path, text);
-    written.push_back(path.string());
+  std::vector<NamedText> files;
+  const auto write = [&files](const fs::path& path, std::string text) {
+    files.emplace_back(path, std::move(text));
   };
   for (const fs::path& path : cameras) {
     write(path, format_camera_file(head, camera));
@@ -167,7 +168,7 @@ std::vector<std::string> write_files(const CameraFlags& flags, const std::vector
   }
   if (!flags.poses.empty())
     write(flags.poses, format_sheet_poses(head, measured.photographs, measured.calibration));
-  return written;
+  return files;
 }
 
 int run_camera(const CameraFlags& flags) {
@@ -184,13 +185,14 @@ int run_camera(const CameraFlags& flags) {
   const CameraCalibration& calibration = measured.calibration;
   const CameraReport report = report_calibration(sheets, measured.photographs, calibration);
   const bool done = calibration.status == CalibrationStatus::ok;
+  std::vector<NamedText> files;
+  if (done) files = files_of(flags, sheets, measured, report);
+  if (!flags.report.empty())
+    files.emplace_back(flags.report, render_camera_page(sheets, calibration, flags.output.string(),
+                                                        measured.setting, report));
+  write_files_atomically(files);
   std::vector<std::string> written;
-  if (done) written = write_files(flags, sheets, measured, report);
-  if (!flags.report.empty()) {
-    write_file_atomically(flags.report, render_camera_page(sheets, calibration, flags.output.string(),
-                                                           measured.setting, report));
-    written.push_back(flags.report.string());
-  }
+  for (const auto& [path, text] : files) written.push_back(path.string());
   if (flags.json) {
     fmt::print("{}\n", camera_json(calibration, report));
   } else {

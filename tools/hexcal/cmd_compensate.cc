@@ -107,13 +107,16 @@ std::vector<fs::path> write_results(const fs::path& folder, const std::string& h
     predicted.push_back(pose);
     actuators.push_back({command.id, status, ok ? command.readings : std::nullopt});
   }
-  std::vector<fs::path> written{folder / "model.yaml"};
-  write_file_atomically(written.back(), model_text(head, report.fitted.model));
-  if (commands.empty()) return written;
-  written.push_back(folder / "predicted_poses.csv");
-  write_file_atomically(written.back(), format_pose_table(head, predicted, PoseColumns::predicted));
-  written.push_back(folder / "actuators.csv");
-  write_file_atomically(written.back(), format_leg_table(head, actuators, true));
+  std::vector<std::pair<fs::path, std::string>> files{
+      {folder / "model.yaml", model_text(head, report.fitted.model)}};
+  if (!commands.empty()) {
+    files.emplace_back(folder / "predicted_poses.csv",
+                       format_pose_table(head, predicted, PoseColumns::predicted));
+    files.emplace_back(folder / "actuators.csv", format_leg_table(head, actuators, true));
+  }
+  write_files_atomically(files);
+  std::vector<fs::path> written;
+  for (const auto& [path, text] : files) written.push_back(path);
   return written;
 }
 

@@ -5,9 +5,11 @@
 #include <optional>
 
 #include "kinematics/geometry/input_error.h"
+#include "pose_extract/image_folders.h"
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/output_file.h"
 #include "tools/io/sheet_file.h"
 #include "tools/io/version.h"
 #include "tools/synthetic/camera_effects_file.h"
@@ -41,7 +43,20 @@ std::uint64_t round_number(const SimulateFlags& flags) {
   return 1 + std::stoull(sha256_hex(inputs).substr(0, 8), nullptr, 16);
 }
 
+// A campaign of rendered photographs among those of a camera would be neither.
+void refuse_photographs(const fs::path& folder) {
+  if (allowed_overwriting() == Overwrite::any_file || !fs::is_directory(folder)) return;
+  std::error_code error;
+  for (const auto& entry : fs::recursive_directory_iterator(folder, error)) {
+    if (!is_photograph_name(entry.path())) continue;
+    throw InputError(
+        fmt::format("{}: holds photographs ({}), wanted a new folder, or --force to write over them",
+                    folder.string(), entry.path().lexically_relative(folder).string()));
+  }
+}
+
 int run_simulate(const SimulateFlags& flags) {
+  refuse_photographs(flags.out);
   SimulationOptions options = flags.options;
   options.brown_lens = flags.lens == "brown";
   if (!flags.sheet.empty()) {

@@ -134,8 +134,8 @@ int run_template(const TemplateFlags& flags) {
   }
   const fs::path yaml = fs::path(flags.output).replace_extension(".yaml");
   if (yaml == flags.output) throw InputError("-o: wanted a name that ends with .pdf");
-  write_file_atomically(flags.output, template_pdf(sheets, options));
-  write_file_atomically(yaml, format_sheet_file(provenance_line(kVersion, "template", {}), sheets));
+  write_files_atomically({{flags.output, template_pdf(sheets, options)},
+                          {yaml, format_sheet_file(provenance_line(kVersion, "template", {}), sheets)}});
   int pages = 0;
   for (const Sheet& each : sheets) {
     fmt::print("{}\n", describe_sheet(each));

@@ -1,6 +1,9 @@
 #include "tools/hexcal/command_line.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "tools/io/json_text.h"
 
 namespace hexcal {
 namespace {
@@ -46,7 +49,27 @@ CommandLineOption option_of(const CLI::Option& option) {
   return out;
 }
 
+nlohmann::ordered_json json_of(const CommandLine& command) {
+  nlohmann::ordered_json out{{"name", command.name},
+                             {"description", command.description},
+                             {"options", nlohmann::ordered_json::array()},
+                             {"commands", nlohmann::ordered_json::array()}};
+  for (const CommandLineOption& option : command.options) {
+    nlohmann::ordered_json row{{"names", option.names}};
+    if (option.names.empty()) row["positional"] = option.positional;
+    row["value"] = option.value;
+    row["choices"] = option.choices;
+    row["required"] = option.required;
+    row["description"] = option.description;
+    out["options"].push_back(row);
+  }
+  for (const CommandLine& below : command.commands) out["commands"].push_back(json_of(below));
+  return out;
+}
+
 }  // namespace
+
+std::string command_json(const CommandLine& app) { return json_text(json_of(app), 1) + "\n"; }
 
 CommandLine command_line_of(const CLI::App& app) {
   CommandLine out;

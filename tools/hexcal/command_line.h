@@ -27,6 +27,9 @@ struct CommandLine {
 
 [[nodiscard]] CommandLine command_line_of(const CLI::App& app);
 
+/// All of it as JSON, for programs that call hexcal.
+[[nodiscard]] std::string command_json(const CommandLine& app);
+
 /// Completion scripts for `app` and its commands. Values that are no choice complete as files.
 [[nodiscard]] std::string bash_completion(const CommandLine& app);
 [[nodiscard]] std::string zsh_completion(const CommandLine& app);

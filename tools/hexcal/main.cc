@@ -12,6 +12,7 @@
 #include "tools/hexcal/commands.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/output_file.h"
 #include "tools/io/version.h"
 
 namespace {
@@ -35,6 +36,9 @@ int main(int argc, char** argv) {
   app.fallthrough();  // --quiet may stand behind the command too
   bool quiet = false;
   app.add_flag("--quiet", quiet, "Print nothing but errors (and what --json asks for)");
+  bool force = false;
+  app.add_flag("--force", force,
+               "Write over what was read, over photographs, YAML and CSV files that hexcal did not write");
   hexcal::Action action;
   // In the order of a day's work.
   for (const auto add :
@@ -48,6 +52,7 @@ int main(int argc, char** argv) {
   }
   try {
     app.parse(argc, argv);
+    if (!force) hexcal::allow_overwriting(hexcal::Overwrite::own_results);
     if (quiet && !wants_json(app)) hexcal::silence_words();
     const int code = action();
     if (std::fflush(stdout) != 0) throw std::system_error(errno, std::generic_category(), "standard output");

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "photogrammetry/photograph/file_signature.h"
+#include "photogrammetry/photograph/input_file.h"
 #include "photogrammetry/photograph/photograph.h"
 #include "tools/hexcal/network_part.h"
 
@@ -42,7 +42,9 @@ int decoding_flags(int width_px, int wanted_px) {
 // By its content; a file's name may promise anything.
 bool is_jpeg(const fs::path& path) {
   std::array<char, 3> head{};
-  std::ifstream(path, std::ios::binary).read(head.data(), head.size());
+  InputFile file(path);
+  if (file.is_pipe() || !file.failure().empty()) return false;
+  (void)file.read(head.data(), head.size());
   return file_signature({head.data(), head.size()}) == FileSignature::jpeg;
 }
 

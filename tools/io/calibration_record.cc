@@ -201,7 +201,7 @@ std::optional<CalibrationReport> read_calibration_record(const std::filesystem::
                                                          const std::string& key) {
   if (!std::filesystem::exists(path)) return std::nullopt;
   try {
-    const RecordJson json = RecordJson::parse(read_file(path));
+    const RecordJson json = RecordJson::parse(read_file(path, ReadFor::own_result));
     if (json.at("key").get<std::string>() != key) return std::nullopt;
     return report_of(json);
   } catch (const RecordJson::exception&) {

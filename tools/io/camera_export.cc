@@ -7,6 +7,8 @@
 
 #include "camera_calib/fit_lens_model.h"
 #include "kinematics/geometry/input_error.h"
+#include "tools/io/atomic_file.h"
+#include "tools/io/version.h"
 
 namespace hexcal {
 namespace {
@@ -39,6 +41,9 @@ LensModelFit as_opencv(const CameraModel& camera, std::size_t terms) {
   return fit_lens_model(frame_rays(camera), camera.width_px, camera.height_px, lens, held);
 }
 
+// By which a later export knows that it may write over the file.
+std::string mark() { return provenance_line(kVersion, "export", {}); }
+
 std::size_t opencv_terms(const CameraModel& camera, std::size_t most) {
   return camera.lens == LensModel::brown ? std::min<std::size_t>(5, most) : most;
 }
@@ -53,7 +58,7 @@ CameraExport to_opencv(const CameraModel& source) {
   const LensModelFit fit = as_opencv(source, terms);
   const CameraModel& c = fit.camera;
   std::string text =
-      fmt::format("%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\n", c.width_px, c.height_px);
+      fmt::format("%YAML:1.0\n---\n{}image_width: {}\nimage_height: {}\n", mark(), c.width_px, c.height_px);
   text += opencv_matrix("camera_matrix", 3, 3, matrix(c));
   text += opencv_matrix("distortion_coefficients", static_cast<int>(terms), 1, lens_terms(c, terms));
   return {text, terms == 5 ? "OpenCV 5 coefficients" : "OpenCV 12 coefficients", fit.rms_px, fit.max_px};
@@ -68,8 +73,8 @@ CameraExport to_ros(const CameraModel& source) {
   const LensModelFit fit = as_opencv(source, terms);
   const CameraModel& c = fit.camera;
   const std::string model = terms == 5 ? "plumb_bob" : "rational_polynomial";
-  std::string text =
-      fmt::format("image_width: {}\nimage_height: {}\ncamera_name: hexcal\n", c.width_px, c.height_px);
+  std::string text = fmt::format("{}image_width: {}\nimage_height: {}\ncamera_name: hexcal\n", mark(),
+                                 c.width_px, c.height_px);
   text += ros_matrix("camera_matrix", 3, 3, matrix(c));
   text += fmt::format("distortion_model: {}\n", model);
   text += ros_matrix("distortion_coefficients", 1, static_cast<int>(terms), lens_terms(c, terms));
@@ -83,10 +88,11 @@ CameraExport to_kalibr(const CameraModel& source) {
   const LensModelFit fit = as_opencv(source, 4);
   const CameraModel& c = fit.camera;
   const std::string text = fmt::format(
-      "cam0:\n  camera_model: pinhole\n  intrinsics: {}\n  distortion_model: radtan\n  distortion_coeffs: "
+      "{}cam0:\n  camera_model: pinhole\n  intrinsics: {}\n  distortion_model: radtan\n  distortion_coeffs: "
       "{}\n"
       "  resolution: [{}, {}]\n  rostopic: /cam0/image_raw\n",
-      list({c.fx_px(), c.fy_px(), c.cx_px(), c.cy_px()}), list(lens_terms(c, 4)), c.width_px, c.height_px);
+      mark(), list({c.fx_px(), c.fy_px(), c.cx_px(), c.cy_px()}), list(lens_terms(c, 4)), c.width_px,
+      c.height_px);
   return {text, "pinhole-radtan", fit.rms_px, fit.max_px};
 }
 

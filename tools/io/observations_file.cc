@@ -306,8 +306,8 @@ DetectionSet parse_observations(std::string_view text, const std::filesystem::pa
   return set;
 }
 
-DetectionSet read_observations(const std::filesystem::path& path) {
-  return parse_observations(read_file(path), path);
+DetectionSet read_observations(const std::filesystem::path& path, ReadFor purpose) {
+  return parse_observations(read_file(path, purpose), path);
 }
 
 }  // namespace hexcal

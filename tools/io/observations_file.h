@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "photogrammetry/markers/detect.h"
+#include "photogrammetry/photograph/input_file.h"
 
 namespace hexcal {
 
@@ -23,7 +24,8 @@ struct DetectionSet {
 [[nodiscard]] std::string observations_text(const DetectionSet& set, std::string_view provenance = {});
 
 /// Reads such a file. Throws InputError naming file, line and what was wanted.
-[[nodiscard]] DetectionSet read_observations(const std::filesystem::path& path);
+[[nodiscard]] DetectionSet read_observations(const std::filesystem::path& path,
+                                             ReadFor purpose = ReadFor::input);
 [[nodiscard]] DetectionSet parse_observations(std::string_view text, const std::filesystem::path& path);
 
 }  // namespace hexcal

@@ -1,18 +1,17 @@
 #include "tools/io/row_stream.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <array>
 #include <charconv>
-#include <cstring>
-#include <fstream>
 #include <future>
+#include <optional>
 
 #include "kinematics/geometry/input_error.h"
+#include "photogrammetry/photograph/input_file.h"
 #include "photogrammetry/photograph/sha256.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/output_file.h"
 #include "tools/io/scalar_text.h"
 
 namespace hexcal {
@@ -131,51 +130,48 @@ Piece transformed(std::string_view text, std::size_t first_line, const fs::path&
   return piece;
 }
 
-// The output under a temporary name until it is complete.
-class PendingFile {
+// The input's bytes in blocks, from a file or from a pipe that has been read.
+class BlockReader {
  public:
-  explicit PendingFile(fs::path target) : target_(std::move(target)) {
-    const fs::path folder = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
-    std::error_code error;
-    fs::create_directories(folder, error);
-    if (fs::is_directory(target_, error))
-      throw InputError(fmt::format("{}: is a folder, wanted a file name to write", target_.string()));
-    remove_abandoned_files(folder, target_.filename().string());
-    path_ = folder / fmt::format(".{}.{}.0.tmp", target_.filename().string(), ::getpid());
-    descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
-    if (descriptor_ < 0) fail();
-  }
-  PendingFile(const PendingFile&) = delete;
-  PendingFile& operator=(const PendingFile&) = delete;
-  ~PendingFile() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-    if (!finished_) ::unlink(path_.c_str());
-  }
-  void write(std::string_view text) {
-    while (!text.empty()) {
-      const ssize_t count = ::write(descriptor_, text.data(), text.size());
-      if (count < 0 && errno == EINTR) continue;
-      if (count < 0) fail();
-      text.remove_prefix(static_cast<std::size_t>(count));
+  explicit BlockReader(const fs::path& path) : path_(path) {
+    if (is_handed_pipe(path)) {
+      kept_ = read_file(path);
+    } else {
+      file_.emplace(path);
+      check();
     }
   }
-  void finish() {
-    const bool flushed = ::fsync(descriptor_) == 0 || errno == EINVAL;
-    const bool closed = ::close(descriptor_) == 0;
-    descriptor_ = -1;
-    if (!flushed || !closed || ::rename(path_.c_str(), target_.c_str()) != 0) fail();
-    finished_ = true;
+  // Hash of all of it, before the first block is read.
+  std::string sha256() {
+    if (!file_) return sha256_hex(kept_);
+    Sha256 hash;
+    std::string block(kBlock, '\0');
+    while (const std::size_t count = file_->read(block.data(), block.size()))
+      hash.add(std::string_view(block).substr(0, count));
+    check();
+    file_->rewind();
+    return hash.hex();
+  }
+  std::size_t read(char* to, std::size_t wanted) {
+    if (!file_) {
+      const std::size_t count = kept_.copy(to, wanted, at_);
+      at_ += count;
+      return count;
+    }
+    const std::size_t count = file_->read(to, wanted);
+    check();
+    return count;
   }
 
  private:
-  [[noreturn]] void fail() const {
-    throw InputError(fmt::format("{}: cannot write: {}", target_.string(), std::strerror(errno)));
+  void check() const {
+    if (!file_->failure().empty()) throw InputError(fmt::format("{}: {}", path_.string(), file_->failure()));
   }
 
-  fs::path target_;
   fs::path path_;
-  int descriptor_ = -1;
-  bool finished_ = false;
+  std::optional<InputFile> file_;
+  std::string kept_;
+  std::size_t at_ = 0;
 };
 
 }  // namespace
@@ -194,16 +190,11 @@ void append_number(std::string& out, double value, int decimals) {
 
 StreamTally stream_rows(const fs::path& input, const fs::path& output, const std::string& head,
                         const RowTransform& transform, int threads) {
-  std::error_code error;
-  if (!fs::exists(input, error)) throw InputError(fmt::format("{}: no such file", input.string()));
-  if (fs::is_directory(input, error))
-    throw InputError(fmt::format("{}: is a folder, wanted a file", input.string()));
-  std::ifstream in(input, std::ios::binary);
-  if (!in) throw InputError(fmt::format("{}: cannot read: {}", input.string(), std::strerror(errno)));
-  PendingFile out(output);
-  std::ifstream whole(input, std::ios::binary);
-  out.write(fmt::format("{}  {} sha256:{}\n{}", head, one_line(input.filename().string()), sha256_hex(whole),
-                        transform.header));
+  BlockReader in(input);
+  remove_abandoned_files(output.has_parent_path() ? output.parent_path() : ".", output.filename().string());
+  OutputFile out(output, fmt::format("{}  {} sha256:{}\n{}", head,
+                                     is_handed_pipe(input) ? "pipe" : one_line(input.filename().string()),
+                                     in.sha256(), transform.header));
 
   std::size_t line = 1;
   std::string name;
@@ -215,10 +206,9 @@ StreamTally stream_rows(const fs::path& input, const fs::path& output, const std
     // What is left of the last block, then whole lines.
     const std::size_t kept = block.size();
     block.resize(kept + kBlock);
-    in.read(block.data() + kept, static_cast<std::streamsize>(kBlock));
-    const bool last = in.gcount() < static_cast<std::streamsize>(kBlock);
-    if (in.bad()) throw InputError(fmt::format("{}: cannot read: {}", input.string(), std::strerror(errno)));
-    block.resize(kept + static_cast<std::size_t>(in.gcount()));
+    const std::size_t count = in.read(block.data() + kept, kBlock);
+    const bool last = count < kBlock;
+    block.resize(kept + count);
     if (!has_header && line == 1 && block.starts_with("\xEF\xBB\xBF")) block.erase(0, 3);
     const std::size_t cut = last ? block.size() : block.rfind('\n') + 1;
     if (cut == 0 && block.size() > kLongestLine)
@@ -260,7 +250,8 @@ StreamTally stream_rows(const fs::path& input, const fs::path& output, const std
     block.erase(0, cut);
   }
   if (!has_header) throw InputError(fmt::format("{}: is empty, wanted a header line", input.string()));
-  out.finish();
+  out.flush();
+  out.rename_to_target();
   return tally;
 }
 

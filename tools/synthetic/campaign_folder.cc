@@ -10,6 +10,7 @@
 #include "tools/io/atomic_file.h"
 #include "tools/io/camera_file.h"
 #include "tools/io/hexapod_file.h"
+#include "tools/io/output_file.h"
 #include "tools/io/sheet_file.h"
 #include "tools/synthetic/random_source.h"
 #include "tools/synthetic/simulation_file.h"
@@ -240,8 +241,9 @@ RoundResult write_campaign(const fs::path& folder, const VirtualLaboratory& labo
     shots.insert(shots.end(), sheet.begin(), sheet.end());
   }
   if (options.edit_shots) options.edit_shots(shots);
-  const auto write = [&](const char* name, const std::string& text) {
-    write_file_atomically(folder / name, text);
+  std::vector<std::pair<fs::path, std::string>> files;
+  const auto write = [&](const char* name, std::string text) {
+    files.emplace_back(folder / name, std::move(text));
   };
   const std::string& head = options.head;
   write("campaign.yaml", head + campaign_text(laboratory));
@@ -263,10 +265,14 @@ RoundResult write_campaign(const fs::path& folder, const VirtualLaboratory& labo
   write("truth/simulation.yaml", format_simulation_file(head, laboratory.options));
   RoundResult result;
   result.skipped = round.skipped;
+  if (options.images) {
+    result.photographs = static_cast<int>(shots.size());
+    write("truth/photos.csv", head + true_stations(shots));
+    write("truth/observations.csv", head + true_observations(laboratory, shots));
+    for (const Shot& shot : shots) require_writable(folder / shot_folder(shot) / shot.file, "");
+  }
+  write_files_atomically(files);
   if (!options.images) return result;
-  result.photographs = static_cast<int>(shots.size());
-  write("truth/photos.csv", head + true_stations(shots));
-  write("truth/observations.csv", head + true_observations(laboratory, shots));
   take_photographs(folder, laboratory, shots, progress);
   return result;
 }
