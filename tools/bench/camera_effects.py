@@ -95,7 +95,7 @@ def read_observations(path):
         if record[0] == "photograph":
             photograph = record[1]
         elif record[0] == "marker":
-            values = [float(value) for value in record[4:]]  # after id, status, method
+            values = [float(value) for value in record[3:51]]  # the last field is the method
             variances = [values[12 + row * (row + 3) // 2] for row in range(8)]
             corners = [values[2 * k:2 * k + 2] for k in range(4)]
             sigmas = [[math.sqrt(max(variances[2 * k + axis], 1e-12)) for axis in range(2)] for k in range(4)]
