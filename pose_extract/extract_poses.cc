@@ -298,6 +298,11 @@ void ExtractOptions::validate() const {
   }
 }
 
+Matrix6d CampaignResult::own_covariance(std::size_t epoch) const {
+  const Matrix6d noise = adjusted.reference_from_body(static_cast<int>(epoch)).own;
+  return epoch < consistency.epochs.size() ? noise + consistency.epochs[epoch].excess : noise;
+}
+
 Matrix6d CampaignResult::pose_covariance(std::size_t a, std::size_t b) const {
   if (!poses[a].pose || !poses[b].pose) return Matrix6d::Zero();
   const PoseInfluence& ia = influences[a];
@@ -305,10 +310,10 @@ Matrix6d CampaignResult::pose_covariance(std::size_t a, std::size_t b) const {
   Matrix6d covariance = ia.by_error * ib.by_error.transpose() + ia.by_ug * UG.own * ib.by_ug.transpose() +
                         ia.by_lg * LG.own * ib.by_lg.transpose();
   if (home_epoch >= 0) {
-    covariance += ia.by_home * adjusted.reference_from_body(home_epoch).own * ib.by_home.transpose();
+    covariance += ia.by_home * own_covariance(static_cast<std::size_t>(home_epoch)) * ib.by_home.transpose();
   }
   if (a == b) {
-    covariance += ia.by_own * adjusted.reference_from_body(static_cast<int>(a)).own * ib.by_own.transpose();
+    covariance += ia.by_own * own_covariance(a) * ib.by_own.transpose();
   }
   return covariance;
 }
@@ -365,6 +370,8 @@ CampaignResult extract_poses(const Campaign& campaign, const CampaignObservation
     return result;
   }
   if (result.adjusted.status != AdjustmentStatus::ok) result.findings.push_back(result.adjusted.reason);
+
+  if (result.has_moving) result.consistency = pose_consistency(result.network, result.adjusted);
 
   const bool nominal_scale = campaign.scale == ScaleFrom::nominal;
   const bool by_ug = nominal_scale && campaign.ug && campaign.ug->from == FrameRule::From::nominal;

@@ -10,6 +10,7 @@
 #include "photogrammetry/markers/detect.h"
 #include "pose_extract/campaign.h"
 #include "pose_extract/datum_frame.h"
+#include "pose_extract/pose_consistency.h"
 
 // From marker observations to the poses of the lower grip: the whole measurement of a campaign, without
 // pixels, files or printing. The stages, in order:
@@ -129,6 +130,7 @@ struct CampaignResult {
   Network network;  ///< what was adjusted; photographs as in CampaignObservations
   AdjustmentResult adjusted;
   DatumFrame UG, LG;
+  CampaignConsistency consistency;  ///< did the moving body stand still while a pose was photographed
   std::vector<MeasuredPose> poses;
   std::vector<MeasuredPhotograph> photographs;
   std::vector<MeasuredLength> bars, checks;
@@ -146,6 +148,9 @@ struct CampaignResult {
     Matrix6d by_home = Matrix6d::Zero();
     Matrix6d by_own = Matrix6d::Zero();
   };
+  /// Covariance of an epoch's reference_from_body that no other estimate shares: noise, and motion between
+  /// its photographs.
+  [[nodiscard]] Matrix6d own_covariance(std::size_t epoch) const;
   std::vector<PoseInfluence> influences;  ///< per pose; empty matrices where there is none
   bool has_moving = false;                ///< the campaign has a moving body
   double gd_mm = 0;                       ///< of LG's rule

@@ -265,6 +265,23 @@ void remark_weak_poses(std::vector<MeasuredPose>& poses) {
 
 }  // namespace
 
+namespace {
+
+// The body that did not stand still while the pose was photographed; its sigma holds the motion.
+void judge_motion(const EpochConsistency& consistency, MeasuredPose& pose) {
+  if (!is_measured(pose.status)) return;
+  if (consistency.moved) {
+    suspect(pose, fmt::format("it moved by {:.2g} mm, {:.2g} deg between its photographs",
+                              consistency.moved_mm, consistency.moved_rad * kDegPerRad));
+  } else if (consistency.stands_out) {
+    add_words(pose.words,
+              fmt::format("its photographs disagree by {:.1f} times their noise; the sigma holds it",
+                          std::sqrt(consistency.chi2 / consistency.dof)));
+  }
+}
+
+}  // namespace
+
 void judge_photographs(const CampaignObservations& observations, CampaignResult& result) {
   judge_misplaced(observations, result);
   std::vector<int> known(result.photographs.size(), 0);
@@ -321,6 +338,7 @@ void judge_poses(const CampaignObservations& observations, const ExtractOptions&
       add_words(pose.words, result.adjusted.reason);
     }
     judge_pose(options, evidence, e, result, pose);
+    if (e < result.consistency.epochs.size()) judge_motion(result.consistency.epochs[e], pose);
     if (!is_measured(pose.status)) pose.pose.reset();
   }
   remark_weak_poses(result.poses);
