@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "calibration/unmeasured.h"
 #include "kinematics/geometry/input_error.h"
 
 namespace hexcal {
@@ -84,6 +85,35 @@ std::vector<PaperEvaluation> evaluate_methods(const ObservationSet& observations
   return evaluations;
 }
 
+// Rows of one table stand over one set of poses: those that every method keeps in the workspace.
+void evaluate_in_common(const ObservationSet& seen, CalibrationReport& report) {
+  std::map<std::string, std::size_t> keepers;
+  std::size_t methods = 0;
+  for (std::size_t m = 0; m < report.evaluations.size(); ++m) {
+    if (!report.comparison.methods[m].failure.empty()) continue;
+    ++methods;
+    for (const std::string& id : report.evaluations[m].valid) ++keepers[id];
+  }
+  std::map<std::size_t, bool> shared;
+  std::vector<PosePair> before;
+  for (std::size_t i = 0; i < seen.poses.size(); ++i) {
+    const PoseObservation& pose = seen.poses[i];
+    const auto found = keepers.find(pose.id);
+    if (found == keepers.end() || found->second != methods) continue;
+    shared[i] = true;
+    report.common.push_back(pose.id);
+    before.push_back({*pose.target, pose.measured});
+  }
+  report.common_before = error_statistics(before);
+  for (std::size_t m = 0; m < report.evaluations.size(); ++m) {
+    const CrossValidation& method = report.comparison.methods[m];
+    std::vector<PosePair> after;
+    for (std::size_t p = 0; p < method.held_out.size(); ++p)
+      if (shared.count(method.held_out_index[p]) != 0) after.push_back(method.held_out[p]);
+    report.evaluations[m].after_common = error_statistics(after);
+  }
+}
+
 void require_poses(const ObservationSet& observations) {
   std::size_t count = 0;
   double spread = 0;
@@ -141,18 +171,27 @@ CalibrationReport calibrate(const PlatformGeometry& nominal, const ObservationSe
     if (!pose.target || pose.is_definition || !pose.complete()) continue;
     report.pose_ids.push_back(pose.id);
     report.errors.push_back(pose_error(pose.measured, *pose.target));
-    const bool outlier =
-        std::find(report.outliers.begin(), report.outliers.end(), pose.id) != report.outliers.end();
-    if (!outlier) pairs.push_back({*pose.target, pose.measured});
   }
-  if (!pairs.empty()) report.uncompensated = error_statistics(pairs);
 
   const std::vector<Candidate> candidates = candidates_for(used, options.identify);
   report.comparison = compare_methods(nominal, used, candidates, options.comparison);
   for (const std::size_t i : report.comparison.unexplained) report.unexplained.push_back(used.poses[i].id);
+  for (const PoseObservation& pose : seen.poses) {
+    if (!pose.target || pose.is_definition || !pose.complete()) continue;
+    if (std::ranges::find(report.unexplained, pose.id) == report.unexplained.end())
+      pairs.push_back({*pose.target, pose.measured});
+  }
+  if (!pairs.empty()) report.uncompensated = error_statistics(pairs);
+  count_unmeasured(nominal, used, frames_unknown, report.comparison);
   if (!pairs.empty()) report.evaluations = evaluate_methods(used, report.comparison, seen);
   for (std::size_t m = 0; m < report.evaluations.size(); ++m)
     report.comparison.methods[m].targets_lost = static_cast<int>(report.evaluations[m].dropped.size());
+  evaluate_in_common(seen, report);
+  // So far of the poses without outliers.
+  for (std::size_t& i : report.comparison.unexplained) i = kept[i];
+  for (CrossValidation& method : report.comparison.methods)
+    for (std::size_t& i : method.held_out_index) i = kept[i];
+  for (const PoseObservation& pose : used.poses) report.fitted_ids.push_back(pose.id);
 
   std::size_t chosen = report.comparison.chosen;
   report.why = report.comparison.why;

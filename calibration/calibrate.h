@@ -26,21 +26,28 @@ struct PaperEvaluation {
   std::vector<std::string> dropped;     ///< and those that fall out of it
   ErrorStatistics before;               ///< over `valid`, as the paper should have done
   ErrorStatistics after;                ///< over `valid`
+  ErrorStatistics after_common;         ///< over CalibrationReport::common
   std::vector<Vector6d> errors_before;  ///< of `valid`: figures 12, 14, 16
   std::vector<Vector6d> errors_after;
 };
 
 struct CalibrationReport {
-  std::vector<std::string> outliers;             ///< the paper's near-singular rule: out for all methods
-  std::vector<std::string> unexplained;          ///< poses that fit no method: out of the comparison
-  std::vector<std::string> pose_ids;             ///< poses with a target, outliers included
-  std::vector<Vector6d> errors;                  ///< measured minus target: figure 9
-  std::optional<ErrorStatistics> uncompensated;  ///< without outliers: figure 10; nothing without targets
-  MethodComparison comparison;
+  std::vector<std::string> outliers;     ///< the paper's near-singular rule: out for all methods
+  std::vector<std::string> unexplained;  ///< poses that fit no method: out of the comparison
+  std::vector<std::string> pose_ids;     ///< poses with a target, outliers included
+  std::vector<Vector6d> errors;          ///< measured minus target: figure 9
+  /// Over the poses that methods are compared on, so without `outliers` and `unexplained`: figure 10; nothing
+  /// without targets.
+  std::optional<ErrorStatistics> uncompensated;
+  /// Poses that every method keeps in the workspace: the set over which rows of one table can be compared.
+  std::vector<std::string> common;
+  ErrorStatistics common_before;
+  MethodComparison comparison;               ///< its indices are of the observations given to calibrate
   std::vector<PaperEvaluation> evaluations;  ///< in the order of comparison.methods; empty without targets
   std::string chosen;                        ///< name of the candidate
   std::string why;
-  FittedMethod fitted;                             ///< the chosen method, fitted to all poses
+  FittedMethod fitted;                             ///< the chosen method, fitted to all poses but outliers
+  std::vector<std::string> fitted_ids;             ///< in the order of fitted.identified's residuals
   std::optional<Identifiability> identifiability;  ///< when that is kinematic
 };
 

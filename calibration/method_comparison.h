@@ -35,6 +35,12 @@ struct FittedMethod {
                                                         const Candidate& candidate, std::string* reason,
                                                         const IdentifyResult* start = nullptr);
 
+/// Predicted error over all six coordinates, rms, where not all of them were measured.
+struct PredictedOverAll {
+  double position_mm = 0;
+  double orientation_rad = 0;
+};
+
 /// How well one candidate compensates poses that it has not seen.
 struct CrossValidation {
   std::string name;
@@ -45,7 +51,8 @@ struct CrossValidation {
   ErrorStatistics errors;  ///< that would remain after compensation, with the measurement's noise in them
   double position_rms_se_mm = 0;  ///< standard errors of the rms values
   double orientation_rms_se_rad = 0;
-  int targets_lost = 0;  ///< targets whose corrected command breaks a limit
+  std::optional<PredictedOverAll> predicted;  ///< see unmeasured.h
+  int targets_lost = 0;                       ///< targets whose corrected command breaks a limit
   /// Squared error of each pose, mm^2, rotations as arcs at the characteristic length; in pose order.
   std::vector<double> losses_mm2;
   std::vector<PosePair> held_out;  ///< target: modelled, actual: measured

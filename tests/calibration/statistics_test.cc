@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "calibration/unmeasured.h"
+#include "tests/support/hexapods.h"
 #include "tests/support/rigid_matchers.h"
 
 namespace hexcal {
@@ -81,6 +83,29 @@ TEST(Statistics, ConstantErrorHasNoRangeButAnRms) {
 TEST(Statistics, OfNothingIsZero) {
   EXPECT_EQ(error_statistics({}).poses, 0);
   EXPECT_EQ(improvement_percent(0, 1), 0);
+}
+
+// With z alone measured, what is not measured is no number, never zero.
+TEST(Unmeasured, CoordinatesAreEmptyAndNeverZero) {
+  MethodComparison comparison;
+  comparison.methods.resize(1);
+  comparison.fitted.resize(1);
+  ObservationSet observations;
+  PoseObservation pose;
+  pose.observed = {false, false, true, false, false, false};
+  observations.poses = {pose, pose};
+  CrossValidation& method = comparison.methods[0];
+  method.name = "none";
+  method.held_out.resize(2);
+  method.held_out[1].actual.position_mm.z() = 0.5;
+  method.held_out_index = {0, 1};
+  method.errors = error_statistics(method.held_out);
+  count_unmeasured(surrogate_hexapod(), observations, false, comparison);
+  EXPECT_TRUE(std::isnan(method.errors.position_rms_mm));
+  EXPECT_TRUE(std::isnan(method.errors.orientation_rms_rad));
+  EXPECT_TRUE(std::isnan(method.errors.rms[0]));
+  EXPECT_DOUBLE_EQ(method.errors.range[2], 0.5);
+  EXPECT_FALSE(method.predicted.has_value());
 }
 
 }  // namespace

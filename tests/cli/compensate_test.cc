@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <random>
 #include <sstream>
 
@@ -106,6 +108,48 @@ TEST_F(Compensate, NamesAnOutlierNearASingularPose) {
       run(table(1.5, 0.3) + "twist,31.5,1.5,1.5,0.3,0.3,75.3\n", table(0, 0) + "twist,0,0,0,0,0,75\n");
   EXPECT_LE(r.exit_code, 1) << r.err;
   EXPECT_THAT(r.out, HasSubstr("left out as near-singular outliers: twist\n"));
+}
+
+// One pose set for all rows: a pose that was measured wrongly may not make every method look good.
+TEST_F(Compensate, AllRowsOfATableStandOverTheSamePoses) {
+  std::string poses = table(1.5, 0.3);
+  std::string targets = table(0, 0);
+  for (int i = 0; i < 30; ++i) {
+    const std::array<int, 6> v{(i * 7) % 31 - 15, (i * 11) % 29 - 14, (i * 5) % 23 - 11,
+                               (i * 3) % 11 - 5,  (i * 5) % 9 - 4,    (i * 7) % 13 - 6};
+    targets += fmt::format("m{}", i);
+    poses += fmt::format("m{}", i);
+    for (int k = 0; k < 6; ++k) {
+      const int wanted = v.at(static_cast<std::size_t>(k));
+      targets += fmt::format(",{}", wanted);
+      // The same error everywhere, and something like noise.
+      poses += fmt::format(",{}", wanted + (k < 3 ? 1.5 : 0.3) + 0.004 * ((i * 17 + k * 29) % 31 - 15));
+    }
+    targets += "\n";
+    poses += "\n";
+  }
+  targets += "lost,5,5,5,1,1,1\n";
+  poses += "lost,45,-25,35,9,-7,12\n";
+  (void)run(poses, targets);
+  const CommandResult r =
+      run_hexcal({"compensate", "--json", "--hexapod", (folder_.path() / "hexapod.yaml").string(),
+                  "--targets", (folder_.path() / "targets.csv").string(), "--poses",
+                  (folder_.path() / "poses.csv").string(), "-o", (folder_.path() / "out").string()});
+  const nlohmann::json out = nlohmann::json::parse(r.out);
+  EXPECT_EQ(out["unexplained"], nlohmann::json::array({"lost"}));
+  EXPECT_EQ(out["uncompensated"]["poses"], 40);
+  EXPECT_LT(out["uncompensated"]["position_max_mm"], 10);
+  const int common = out["common_before"]["poses"];
+  EXPECT_GT(common, 0);
+  for (const auto& method : out["methods"]) {
+    if (!method.contains("failure")) {
+      EXPECT_EQ(method["common_after"]["poses"], common) << method["name"];
+    }
+  }
+  if (out.contains("identified")) {
+    EXPECT_EQ(out["identified"]["poses"][0]["pose"], "p0");
+    EXPECT_EQ(out["identified"]["poses"].back()["pose"], "lost");
+  }
 }
 
 TEST_F(Compensate, ResultsGoToControllers) {

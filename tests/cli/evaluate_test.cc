@@ -35,6 +35,35 @@ TEST_F(Evaluate, PrintsThePapersTableAndTheFairOne) {
   EXPECT_THAT(r.out, AllOf(HasSubstr("9.8 %"), HasSubstr("19.9 %"), HasSubstr("same 2 poses")));
 }
 
+// The home that defines LG is zero by definition: counted, it makes every error look smaller.
+TEST_F(Evaluate, TheHomeThatDefinesTheFrameIsNoMeasuredError) {
+  const std::string targets = write("t.csv", "home,0,0,0,0,0,0\na,1,0,0,0,0,0\nb,0,2,0,0,0,0\n");
+  const std::filesystem::path before = folder_.path() / "b.csv";
+  std::ofstream(before) << "pose,status,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg,sigma_x_mm,sigma_y_mm,"
+                           "sigma_z_mm,sigma_roll_deg,sigma_pitch_deg,sigma_yaw_deg\n"
+                           "home,ok,0,0,0,0,0,0,0,0,0,0,0,0\n"
+                           "a,ok,4,0,0,0,0,0,0.1,0.1,0.1,0.1,0.1,0.1\n"
+                           "b,ok,0,5,0,0,0,0,0.1,0.1,0.1,0.1,0.1,0.1\n";
+  const CommandResult r = run_hexcal({"evaluate", "--targets", targets, "--before", before.string()});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.out, AllOf(HasSubstr("same 2 poses"), HasSubstr("3.0000")));
+}
+
+TEST_F(Evaluate, TablesOfOneNameAreToldApartAndZeroHasNoSign) {
+  const std::string targets = write("t.csv", "a,0,0,0,0,0,0\nb,10,0,0,5,0,0\n");
+  const std::string before = write("b.csv", "a,1,0,0,0,0,0\nb,10,0,0,5,0,0\n");
+  std::vector<std::string> command{"evaluate", "--targets", targets, "--before", before};
+  for (const char* folder : {"A", "B"}) {
+    std::filesystem::create_directories(folder_.path() / folder / "results");
+    command.insert(command.end(), {"--after", write(std::string(folder) + "/results/poses.csv",
+                                                    "a,1.000001,0,0,0,0,0\nb,10,0,0,5,0,0\n")});
+  }
+  const CommandResult r = run_hexcal(command);
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.out, AllOf(HasSubstr("A/results/poses"), HasSubstr("B/results/poses"), HasSubstr("0.0 %"),
+                           ::testing::Not(HasSubstr("-0.0"))));
+}
+
 TEST_F(Evaluate, RefusesTablesThatShareNoPose) {
   const std::string targets = write("t.csv", "a,0,0,0,0,0,0\n");
   const std::string before = write("b.csv", "z,1,0,0,0,0,0\n");

@@ -33,6 +33,17 @@ TEST(CampaignReport, ASuspectPoseIsRedAndCountsInNoStatistic) {
   EXPECT_FALSE(paper_data(report).before.pairs[0].has_value());
 }
 
+TEST(CampaignReport, WhatNoMethodIsJudgedOnIsNoPartOfBefore) {
+  CampaignReport report = sample_report();
+  ASSERT_TRUE(paper_data(report).before.pairs[1].has_value());
+  report.compensation->calibration.unexplained = {report.poses[0].id};
+  report.compensation->calibration.outliers = {report.poses[1].id};
+  report.poses[3].pose = Pose{};
+  report.poses[3].sigma->setZero();
+  for (const std::size_t i : {0U, 1U, 3U}) EXPECT_FALSE(paper_data(report).before.pairs[i].has_value()) << i;
+  EXPECT_TRUE(paper_data(report).before.pairs[4].has_value());
+}
+
 TEST(CampaignReport, TheVerdictIsShownFirst) {
   const std::string page = render_page(campaign_page(sample_report()));
   EXPECT_THAT(page, HasSubstr("Nearly all went well."));

@@ -40,6 +40,7 @@ struct EvaluatedTable {
   std::vector<std::string> without_pose;
   std::vector<std::string> suspect;  // measured, but something contradicts them: left out
   std::vector<std::string> without_target;
+  std::vector<std::string> defining;  // the home that defines LG: zero by definition, no error of anything
   ErrorStatistics own;
   ErrorStatistics common;
 };
@@ -52,6 +53,8 @@ EvaluatedTable read_table(const fs::path& path, const std::string& label, const 
       table.without_pose.push_back(record.id);
     } else if (is_suspect(record.status)) {
       table.suspect.push_back(record.id);
+    } else if (record.sigma && record.sigma->isZero(0) && record.pose->vector().isZero(0)) {
+      table.defining.push_back(record.id);
     } else if (targets.count(record.id) == 0) {
       table.without_target.push_back(record.id);
     } else {
@@ -67,6 +70,35 @@ EvaluatedTable read_table(const fs::path& path, const std::string& label, const 
     return pairs;
   }());
   return table;
+}
+
+// The file's name where that tells the tables apart, else as many of its folders as it takes.
+std::vector<std::string> labels_of(const std::vector<fs::path>& tables) {
+  if (tables.size() == 1) return {"after"};
+  std::vector<std::string> labels;
+  std::vector<fs::path> rest;
+  for (const fs::path& table : tables) {
+    const fs::path whole = fs::absolute(table).lexically_normal();
+    labels.push_back(whole.stem().string());
+    rest.push_back(whole.parent_path());
+  }
+  const auto same = [&](std::size_t i) { return std::ranges::count(labels, labels[i]) > 1; };
+  for (bool changed = true; changed;) {
+    changed = false;
+    const std::vector<std::string> before = labels;
+    for (std::size_t i = 0; i < labels.size(); ++i) {
+      if (std::ranges::count(before, before[i]) < 2 || !rest[i].has_filename()) continue;
+      labels[i] = rest[i].filename().string() + "/" + labels[i];
+      rest[i] = rest[i].parent_path();
+      changed = true;
+    }
+  }
+  for (std::size_t i = labels.size(); i-- > 0;)
+    if (same(i))
+      labels[i] += fmt::format(
+          " ({})",
+          std::count(labels.begin(), labels.begin() + static_cast<std::ptrdiff_t>(i) + 1, labels[i]));
+  return labels;
 }
 
 Json improvement_json(const ErrorStatistics& before, const ErrorStatistics& after) {
@@ -124,10 +156,9 @@ int run_evaluate(const EvaluateFlags& flags) {
     if (record.pose) targets[record.id] = *record.pose;
   }
   std::vector<EvaluatedTable> tables{read_table(flags.before, "before", targets)};
-  for (const fs::path& path : flags.after) {
-    const std::string label = flags.after.size() == 1 ? "after" : path.stem().string();
-    tables.push_back(read_table(path, label, targets));
-  }
+  const std::vector<std::string> labels = labels_of(flags.after);
+  for (std::size_t i = 0; i < flags.after.size(); ++i)
+    tables.push_back(read_table(flags.after[i], labels[i], targets));
   std::vector<std::string> common;
   for (const auto& shared : tables[0].poses) {
     const std::string& id = shared.first;
@@ -149,7 +180,8 @@ int run_evaluate(const EvaluateFlags& flags) {
                {"common_poses", error_json(table.common)},
                {"without_pose", table.without_pose},
                {"suspect", table.suspect},
-               {"without_target", table.without_target}};
+               {"without_target", table.without_target},
+               {"defines_frame", table.defining}};
     if (&table != &tables[0]) {
       entry["improvement_own_poses"] = improvement_json(tables[0].own, table.own);
       entry["improvement_common_poses"] = improvement_json(tables[0].common, table.common);

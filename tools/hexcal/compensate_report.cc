@@ -17,7 +17,13 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 std::string method_table(const CalibrationReport& report) {
-  TextTable text({"method", "numbers", "rms_mm", "+-", "max_mm", "rms_deg", "+-", "max_deg", "lost"});
+  const auto& all = report.comparison.methods;
+  const bool incomplete = std::ranges::any_of(all, [](const auto& m) { return m.predicted.has_value(); });
+  std::vector<std::string> columns{"method",  "numbers", "rms_mm",  "+-",  "max_mm",
+                                   "rms_deg", "+-",      "max_deg", "lost"};
+  // Not all coordinates were measured: the error over all six can only be predicted.
+  if (incomplete) columns.insert(columns.end(), {"predicted_mm", "predicted_deg"});
+  TextTable text(columns);
   for (std::size_t i = 0; i < report.comparison.methods.size(); ++i) {
     const CrossValidation& method = report.comparison.methods[i];
     const bool chosen = method.name == report.chosen;
@@ -27,18 +33,27 @@ std::string method_table(const CalibrationReport& report) {
       continue;
     }
     const ErrorStatistics& e = method.errors;
-    text.add_row({label, std::to_string(method.complexity), decimal(e.position_rms_mm, 4),
-                  decimal(method.position_rms_se_mm, 4), decimal(e.position_max_mm, 4),
-                  decimal(e.orientation_rms_rad * kDegPerRad, 4),
-                  decimal(method.orientation_rms_se_rad * kDegPerRad, 4),
-                  decimal(e.orientation_max_rad * kDegPerRad, 4),
-                  i < report.evaluations.size() ? std::to_string(report.evaluations[i].dropped.size()) : "-"},
-                 chosen ? Colour::bold : Colour::plain);
+    std::vector<std::string> cells{
+        label,
+        std::to_string(method.complexity),
+        decimal(e.position_rms_mm, 4),
+        decimal(method.position_rms_se_mm, 4),
+        decimal(e.position_max_mm, 4),
+        decimal(e.orientation_rms_rad * kDegPerRad, 4),
+        decimal(method.orientation_rms_se_rad * kDegPerRad, 4),
+        decimal(e.orientation_max_rad * kDegPerRad, 4),
+        i < report.evaluations.size() ? std::to_string(report.evaluations[i].dropped.size()) : "-"};
+    if (incomplete && method.predicted) {
+      cells.push_back(decimal(method.predicted->position_mm, 4));
+      cells.push_back(decimal(method.predicted->orientation_rad * kDegPerRad, 4));
+    }
+    text.add_row(cells, chosen ? Colour::bold : Colour::plain);
   }
   return text.text();
 }
 
 std::string paper_table(const CalibrationReport& report) {
+  if (report.common.empty()) return "no pose stays in the workspace with every method: no common table\n";
   std::vector<std::string> columns = paper_columns("the paper's ranges");
   columns.emplace_back("improvement");
   TextTable text(columns);
@@ -47,18 +62,20 @@ std::string paper_table(const CalibrationReport& report) {
     cells.push_back(improvement);
     text.add_row(cells);
   };
-  add("uncompensated", *report.uncompensated, "");
+  add("uncompensated", report.common_before, "");
   for (const PaperEvaluation& evaluation : report.evaluations) {
     const bool paper = evaluation.method.rfind("option", 0) == 0;
     if (!paper && evaluation.method != report.chosen) continue;
-    if (evaluation.valid.empty()) continue;
-    // The paper's own way: the uncompensated ranges of all poses against those of the valid ones.
-    add(evaluation.method, evaluation.after,
-        fmt::format("{:.1f} %, {:.1f} %",
-                    improvement_percent(report.uncompensated->position_magnitude_mm,
-                                        evaluation.after.position_magnitude_mm),
-                    improvement_percent(report.uncompensated->orientation_magnitude_rad,
-                                        evaluation.after.orientation_magnitude_rad)));
+    if (evaluation.after_common.poses == 0) continue;
+    // All rows over the same poses: the paper compares all poses before with those that were left after.
+    const ErrorStatistics& before = report.common_before;
+    const ErrorStatistics& after = evaluation.after_common;
+    add(evaluation.method, after,
+        fmt::format(
+            "{} %, {} %",
+            decimal(improvement_percent(before.position_magnitude_mm, after.position_magnitude_mm), 1),
+            decimal(improvement_percent(before.orientation_magnitude_rad, after.orientation_magnitude_rad),
+                    1)));
   }
   return text.text();
 }
@@ -103,8 +120,9 @@ const char* status_name(CommandStatus status) {
 // JSON has no infinity.
 Json finite(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
-Json identified_json(const IdentifyResult& identified, const Identifiability& judged,
-                     const ObservationTable& table) {
+Json identified_json(const CalibrationReport& report) {
+  const IdentifyResult& identified = *report.fitted.identified;
+  const Identifiability& judged = *report.identifiability;
   Json out{{"free_parameters", judged.free_parameters},
            {"rank", judged.rank},
            {"determined", judged.determined},
@@ -129,9 +147,9 @@ Json identified_json(const IdentifyResult& identified, const Identifiability& ju
     out["weak"].push_back({{"gain", weak.gain}, {"parameters", weak.parameters}});
   for (const LegDiagnosis& leg : judged.legs)
     out["legs"].push_back({{"leg", leg.leg}, {"wrong", leg.wrong}, {"diagnosis", leg.sentence}});
-  const auto& poses = table.observations.poses;
-  for (std::size_t i = 0; i < identified.pose_residuals.size() && i < poses.size(); ++i)
-    out["poses"].push_back({{"residual_mm_deg", json_mm_deg(identified.pose_residuals[i])},
+  for (std::size_t i = 0; i < identified.pose_residuals.size(); ++i)
+    out["poses"].push_back({{"pose", report.fitted_ids[i]},
+                            {"residual_mm_deg", json_mm_deg(identified.pose_residuals[i])},
                             {"weight", identified.weights[i]},
                             {"influence", identified.influence[i]}});
   return out;
@@ -194,23 +212,31 @@ std::string compensation_json(const CalibrationReport& report, const Observation
       entry["failure"] = method.failure;
     } else {
       entry["cross_validated"] = error_json(method.errors);
-      entry["position_rms_se_mm"] = method.position_rms_se_mm;
-      entry["orientation_rms_se_deg"] = method.orientation_rms_se_rad * kDegPerRad;
+      entry["position_rms_se_mm"] = finite(method.position_rms_se_mm);
+      entry["orientation_rms_se_deg"] = finite(method.orientation_rms_se_rad * kDegPerRad);
+      if (method.predicted) {
+        entry["predicted_over_all"] = {{"position_mm", method.predicted->position_mm},
+                                       {"orientation_deg", method.predicted->orientation_rad * kDegPerRad}};
+      }
     }
     if (i < report.evaluations.size()) {
       entry["lost"] = report.evaluations[i].dropped;
       entry["valid_before"] = error_json(report.evaluations[i].before);
       entry["valid_after"] = error_json(report.evaluations[i].after);
+      entry["common_after"] = error_json(report.evaluations[i].after_common);
     }
     out["methods"].push_back(entry);
   }
-  if (report.uncompensated) out["uncompensated"] = error_json(*report.uncompensated);
+  if (report.uncompensated) {
+    out["uncompensated"] = error_json(*report.uncompensated);
+    out["common"] = report.common;
+    out["common_before"] = error_json(report.common_before);
+  }
   out["outliers"] = report.outliers;
   out["unexplained"] = report.unexplained;
   for (const auto& pose : table.left_out)
     out["left_out"].push_back({{"pose", pose.id}, {"reason", pose.reason}});
-  if (report.identifiability)
-    out["identified"] = identified_json(*report.fitted.identified, *report.identifiability, table);
+  if (report.identifiability) out["identified"] = identified_json(report);
   for (const CorrectedCommand& command : commands) {
     Json entry{{"pose", command.id}, {"status", status_name(command.status)}};
     if (!command.reason.empty()) entry["reason"] = command.reason;

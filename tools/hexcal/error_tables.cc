@@ -2,11 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "tools/io/pose_table.h"
 
 namespace hexcal {
 
-std::string decimal(double value, int digits) { return fmt::format("{:.{}f}", value, digits); }
+std::string decimal(double value, int digits) {
+  if (!std::isfinite(value)) return "-";
+  std::string text = fmt::format("{:.{}f}", value, digits);
+  const bool negative_zero = text[0] == '-' && text.find_first_of("123456789") == std::string::npos;
+  return negative_zero ? text.substr(1) : text;
+}
 
 nlohmann::ordered_json json_mm_deg(const Vector6d& mm_and_rad) {
   auto list = nlohmann::ordered_json::array();

@@ -8,7 +8,7 @@
 
 namespace hexcal {
 
-/// With that many digits after the point.
+/// With that many digits after the point; what rounds to zero has no sign, what is not a number is "-".
 [[nodiscard]] std::string decimal(double value, int digits);
 
 /// x, y, z in mm; roll, pitch, yaw in degrees, of mm and rad.

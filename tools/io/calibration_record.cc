@@ -72,7 +72,7 @@ RecordJson method_json(const CrossValidation& method) {
           {"standard_errors", {method.position_rms_se_mm, method.orientation_rms_se_rad}},
           {"targets_lost", method.targets_lost},
           {"held_out", pairs},
-          {"held_out_index", method.held_out_index}};
+          {"held_out_observations", method.held_out_index}};
 }
 
 CrossValidation method_of(const RecordJson& json) {
@@ -90,7 +90,7 @@ CrossValidation method_of(const RecordJson& json) {
     method.held_out.push_back(
         {Pose::from_vector(vector_of(pair.at(0))), Pose::from_vector(vector_of(pair.at(1)))});
   }
-  method.held_out_index = json.at("held_out_index").get<std::vector<std::size_t>>();
+  method.held_out_index = json.at("held_out_observations").get<std::vector<std::size_t>>();
   return method;
 }
 

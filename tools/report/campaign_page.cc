@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "tools/report/report_sections.h"
 
@@ -46,14 +47,24 @@ PaperData paper_data(const CampaignReport& report) {
   PaperData data;
   data.before.name = "before";
   const std::map<std::string, Pose> targets = poses_by_id(report.targets);
+  // What no method is judged on is no part of "before" either: all rows and figures stand over one set.
+  std::set<std::string> left_out;
+  if (report.compensation) {
+    const CalibrationReport& calibration = report.compensation->calibration;
+    left_out.insert(calibration.outliers.begin(), calibration.outliers.end());
+    left_out.insert(calibration.unexplained.begin(), calibration.unexplained.end());
+  }
   for (const PoseRecord& record : report.poses) {
     const auto target = targets.find(record.id);
     if (target == targets.end()) continue;
     data.pose_ids.push_back(record.id);
     data.sigma.push_back(record.sigma);
-    data.before.pairs.push_back(record.pose && !is_suspect(record.status)
-                                    ? std::optional(PosePair{target->second, *record.pose})
-                                    : std::nullopt);
+    // The home that defines LG is zero by definition, no measurement of an error.
+    const bool defines =
+        record.pose && record.sigma && record.sigma->isZero(0) && record.pose->vector().isZero(0);
+    const bool counts = !is_suspect(record.status) && !defines && left_out.count(record.id) == 0;
+    data.before.pairs.push_back(record.pose && counts ? std::optional(PosePair{target->second, *record.pose})
+                                                      : std::nullopt);
   }
   if (report.compensation) {
     for (const CrossValidation& method : report.compensation->calibration.comparison.methods) {
