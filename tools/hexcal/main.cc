@@ -1,3 +1,4 @@
+#include <fcntl.h>
 #include <fmt/format.h>
 
 #include <cerrno>
@@ -5,6 +6,8 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <new>
+#include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
 #include <system_error>
 
@@ -25,9 +28,24 @@ bool wants_json(const CLI::App& app) {
   return false;
 }
 
+// A stream that was closed before the start would be the next file that is opened, and words would go into
+// it.
+void open_closed_streams() {
+  for (int stream = 0; stream <= 2; ++stream) {
+    if (::fcntl(stream, F_GETFD) < 0 && errno == EBADF)
+      (void)::open("/dev/null", stream == 0 ? O_RDONLY : O_WRONLY);  // the lowest number that is free
+  }
+}
+
+int no_memory() {
+  fmt::print(stderr, "hexcal: not enough memory\n");
+  return hexcal::kInputError;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  open_closed_streams();
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // a photograph's status says it
   std::signal(SIGXFSZ, SIG_IGN);  // a file size limit is an error of the write that meets it, with words
   CLI::App app{"hexcal: calibration of a Stewart platform by photographs", "hexcal"};
@@ -71,7 +89,11 @@ int main(int argc, char** argv) {
   } catch (const std::system_error& error) {  // a full disk behind standard output
     fmt::print(stderr, "hexcal: {}\n", hexcal::one_line(error.what()));
     return hexcal::kInputError;
+  } catch (const std::bad_alloc&) {
+    return no_memory();
   } catch (const std::exception& error) {
+    const auto* from_opencv = dynamic_cast<const cv::Exception*>(&error);
+    if (from_opencv != nullptr && from_opencv->code == cv::Error::StsNoMem) return no_memory();
     fmt::print(stderr,
                "hexcal: internal error: {}\nThis is a bug in hexcal; please report it with the command.\n",
                error.what());
