@@ -54,7 +54,8 @@ struct FeatureFrame {
 
 /// How a body's frame (UG of the fixed body, LG of the moving one) is found.
 struct FrameRule {
-  enum class From { nominal, home, features };
+  /// markers: UG from the fixed body's own markers and home, see frame_from_markers.
+  enum class From { nominal, home, features, markers };
   From from = From::nominal;
   std::optional<std::filesystem::path> nominal_file;
   std::vector<NominalPoint> nominal;     ///< From::nominal: what nominal_file says

@@ -41,6 +41,12 @@ struct DatumFrame {
 [[nodiscard]] DatumFrame frame_from_features(const Network& network, const AdjustmentResult& adjusted,
                                              int body, const FeatureFrame& features);
 
+/// UG where nothing is known but what the photographs show: origin at the mean of the fixed markers' centres,
+/// z from the mean of the moving ones at home towards it, y away from who stands before the fixed markers
+/// (the side to which they face on average; where they face all around, that of the lowest), x to his right.
+[[nodiscard]] DatumFrame frame_from_markers(const Network& network, const AdjustmentResult& adjusted,
+                                            int home_epoch);
+
 /// Frame of the lowest marker of a body: for projects that define none.
 [[nodiscard]] DatumFrame frame_from_first_marker(const Network& network, const AdjustmentResult& adjusted,
                                                  int body);

@@ -86,6 +86,11 @@ TEST_F(CampaignFile, RefusesWithFileLineAndKey) {
   EXPECT_THAT(error(with("[0-9]", "[0-9, 3]")), HasSubstr("marker 3 stands twice"));
   EXPECT_THAT(error(with(", gd_mm: 50", "")), HasSubstr("frames.LG.gd_mm: missing"));
   EXPECT_THAT(error(with("from: home", "from: hom")), HasSubstr("wanted one of nominal, home, features"));
+  EXPECT_EQ(read(with("{from: nominal, file: nominal.csv}", "{from: markers}")).ug->from,
+            FrameRule::From::markers);
+  std::string no_home = with("{from: nominal, file: nominal.csv}", "{from: markers}");
+  no_home.replace(no_home.find("from: home, pose: home"), 22, "from: nominal, file: nominal.csv");
+  EXPECT_THAT(error(no_home), HasSubstr("UG from markers wants LG from home"));
   EXPECT_THAT(error(with("{from: markers}", "{from: nominal}") + "extra: 1\n"),
               HasSubstr("unknown key 'extra'"));
   EXPECT_THAT(error(with("{from: markers}", "{from: bars}")), HasSubstr("scale.bars: missing"));

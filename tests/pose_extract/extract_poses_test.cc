@@ -128,6 +128,56 @@ TEST_F(ExtractPoses, PoseCovariancesAreHonestAndCorrelatedThroughHome) {
   EXPECT_GT(correlation, 0.2);  // both carry the home pose's noise
 }
 
+// UG from the markers alone is another frame on the same body: motions agree up to that one turn, and the
+// covariances are as honest.
+TEST_F(ExtractPoses, UgFromMarkersNeedsNoCoordinates) {
+  double sum = 0;
+  int count = 0;
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    ObservationSceneOptions options;
+    options.num_epochs = 5;
+    options.noise_px = 0.01;
+    options.interior_sigma = 1;
+    options.seed = seed;
+    CampaignScene made = make_campaign_scene(options);
+    made.campaign.ug->from = FrameRule::From::markers;
+    const CampaignResult result = extract_poses(made.campaign, made.observations);
+    ASSERT_TRUE(result.UG.ok) << result.UG.reason;
+    // The same frame from the true geometry.
+    Eigen::Vector3d fixed = Eigen::Vector3d::Zero();
+    Eigen::Vector3d moving = Eigen::Vector3d::Zero();
+    Eigen::Vector3d facing = Eigen::Vector3d::Zero();
+    for (std::size_t m = 0; m < 20; ++m) {
+      const Rigid3& marker = made.scene.body_from_marker[m];
+      if (m < 10) {
+        fixed += marker.translation / 10;
+        facing += marker.rotation_matrix().col(2);
+      } else {
+        moving += made.scene.fixed_from_moving[0] * marker.translation / 10;
+      }
+    }
+    Eigen::Matrix3d axes;
+    axes.col(2) = (fixed - moving).normalized();
+    axes.col(0) = axes.col(2).cross(facing).normalized();
+    axes.col(1) = axes.col(2).cross(axes.col(0));
+    EXPECT_LT(axes.col(1).dot(facing), 0);  // the markers face -y
+    const Rigid3 ug_from_fixed = inverse(Rigid3(axes, fixed));
+    for (std::size_t e = 1; e < 5; ++e) {
+      ASSERT_TRUE(result.poses[e].pose) << result.poses[e].words;
+      const auto in_ug = [&](std::size_t epoch) {
+        return ug_from_fixed * made.scene.fixed_from_moving[epoch];
+      };
+      const Pose truth = pose_from_ug_from_lg(in_ug(e) * inverse(in_ug(0)) * ug_from_lg(Pose(), 50), 50);
+      const Vector6d error = pose_error(*result.poses[e].pose, truth);
+      EXPECT_LT(error.head<3>().norm(), 2 * kCleanErrorMm) << "seed " << seed;
+      sum += error.dot(result.poses[e].covariance.ldlt().solve(error)) / 6;
+      ++count;
+    }
+  }
+  EXPECT_GT(sum / count, 0.7);
+  EXPECT_LT(sum / count, 1.4);
+}
+
 TEST_F(ExtractPoses, UnreadablePhotographIsNamedAndItsPoseGoesOn) {
   seen("p02", 1).status = PhotographStatus::truncated;
   seen("p02", 1).reason = "ends after 40 of 100 kB";

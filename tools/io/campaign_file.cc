@@ -116,7 +116,7 @@ FrameRule read_frame(const YamlMap& frames, const std::string& name, const std::
   FrameRule rule;
   const std::vector<std::string> allowed = name == "LG"
                                                ? std::vector<std::string>{"nominal", "home", "features"}
-                                               : std::vector<std::string>{"nominal", "features"};
+                                               : std::vector<std::string>{"nominal", "features", "markers"};
   const std::string from = map.choice("from", allowed);
   if (from == "nominal") {
     rule.from = FrameRule::From::nominal;
@@ -125,6 +125,8 @@ FrameRule read_frame(const YamlMap& frames, const std::string& name, const std::
   } else if (from == "home") {
     rule.from = FrameRule::From::home;
     rule.home_pose = map.text("pose");
+  } else if (from == "markers") {
+    rule.from = FrameRule::From::markers;
   } else {
     rule.from = FrameRule::From::features;
     rule.features = FeatureFrame{read_feature(map, "z"), read_feature(map, "x"), read_feature(map, "origin"),
@@ -250,6 +252,11 @@ Campaign read_campaign(const std::filesystem::path& folder_or_file) {
   }
   if (!campaign.moving.empty() && !(campaign.ug && campaign.lg)) {
     top.fail("frames", "wanted UG and LG, since there are moving markers");
+  }
+  if (campaign.ug && campaign.ug->from == FrameRule::From::markers &&
+      !(campaign.lg && campaign.lg->from == FrameRule::From::home)) {
+    top.fail("frames",
+             "UG from markers wants LG from home: z points from the moving to the fixed markers there");
   }
   read_scale(top, campaign);
   if (top.has("checks")) campaign.checks = read_lengths(top, "checks");

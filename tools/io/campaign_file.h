@@ -19,6 +19,7 @@ namespace hexcal {
 ///   markers                 {family, fixed: {ids, size_mm}, moving: {ids, size_mm}};
 ///                           ids: [0-9, 12] or a map {100: 24, 101: 12} of sizes
 ///   frames.UG, frames.LG    {from: nominal, file},
+///                           {from: markers} (UG only: no coordinates, see frame_from_markers),
 ///                           {from: home, pose, gd_mm} (LG only), or
 ///                           {from: features, z: {plane: [..]}, x: {line: [..]}, origin: {circle: [..]},
 ///                            offset_mm: [0, 0, 0]}
