@@ -208,7 +208,31 @@ CalibrationReport calibrate(const PlatformGeometry& nominal, const ObservationSe
   report.fitted = *report.comparison.fitted[chosen];  // what cannot be fitted is not chosen
   if (report.fitted.identified)
     report.identifiability = judge_identifiability(nominal, *report.fitted.identified);
+  report.doubt = doubt_machine({.nominal = &nominal,
+                                .observations = &used,
+                                .seen = &seen,
+                                .unexplained = &report.unexplained,
+                                .comparison = &report.comparison,
+                                .frames_unknown = frames_unknown});
+  // A model that is doubted is not handed on.
+  if (report.doubt) report.fitted.model = CalibrationModel{.nominal = nominal};
   return report;
+}
+
+std::vector<CorrectedCommand> corrected_commands(const CalibrationReport& report,
+                                                 const std::vector<Target>& targets) {
+  const auto& identified = report.fitted.identified;
+  std::vector<CorrectedCommand> commands =
+      compensate(report.fitted.model, targets, identified ? &*identified : nullptr);
+  if (!report.doubt) return commands;
+  for (CorrectedCommand& command : commands) {
+    command.status = CommandStatus::withheld;
+    command.reason = "withheld: the measured poses contradict hexapod.yaml";
+    command.predicted.reset();
+    command.readings.reset();
+    command.sigma.reset();
+  }
+  return commands;
 }
 
 }  // namespace hexcal

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calibration/identifiability.h"
+#include "calibration/machine_doubt.h"
 #include "calibration/method_comparison.h"
 
 namespace hexcal {
@@ -49,6 +50,9 @@ struct CalibrationReport {
   FittedMethod fitted;                             ///< the chosen method, fitted to all poses but outliers
   std::vector<std::string> fitted_ids;             ///< in the order of fitted.identified's residuals
   std::optional<Identifiability> identifiability;  ///< when that is kinematic
+  /// Where set, poses and hexapod.yaml do not speak of one machine: nothing here is to be sent to it, and
+  /// fitted.model is the nominal machine.
+  std::optional<MachineDoubt> doubt;
 };
 
 /// From observations to a model: outliers out, all methods side by side by cross-validation, the wanted or
@@ -56,5 +60,10 @@ struct CalibrationReport {
 /// all at one place, all level) or the wanted one.
 [[nodiscard]] CalibrationReport calibrate(const PlatformGeometry& nominal, const ObservationSet& observations,
                                           const CalibrateOptions& options = {});
+
+/// The chosen method's commands for the targets; where the report doubts the machine, every one is `withheld`
+/// and has no numbers.
+[[nodiscard]] std::vector<CorrectedCommand> corrected_commands(const CalibrationReport& report,
+                                                               const std::vector<Target>& targets);
 
 }  // namespace hexcal

@@ -14,6 +14,7 @@ enum class CommandStatus {
   out_of_stroke,  ///< a leg would leave its stroke
   joint_limit,    ///< a joint would turn too far, legs would touch or the machine turn inside out
   no_pose,        ///< the controller's geometry has no pose with these legs
+  withheld,       ///< the measured poses contradict the machine (machine_doubt.h)
 };
 
 /// What to tell the machine so that it reaches one target.

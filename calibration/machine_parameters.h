@@ -32,7 +32,7 @@ struct ParameterLayout {
 /// What kind of number a parameter is; parameters of a kind share a tolerance.
 enum class ParameterKind { joint, offset, scale, lead, frame, curve, common_curve, sag, backlash };
 
-/// "leg 1 base x", "leg 6 scale", "screw lead", "UG frame x", "LG frame yaw", "leg 2 curve 3", "common curve
+/// "leg 1 base x", "leg 6 scale", "screw lead", "UG frame x", "LG frame rz", "leg 2 curve 3", "common curve
 /// 3", "sag 1", "leg 4 backlash".
 [[nodiscard]] std::string parameter_name(const ParameterLayout& layout, int index);
 [[nodiscard]] ParameterKind parameter_kind(const ParameterLayout& layout, int index);

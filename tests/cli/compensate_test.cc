@@ -22,6 +22,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr const char* kHexapod =
     "base_joints_mm: [[254.3, 54.1, 0], [-80.3, 247.3, 0], [-174, 193.2, 0], [-174, -193.2, 0], [-80.3, "
@@ -100,6 +101,27 @@ TEST_F(Compensate, RefusesInOneClearLine) {
   refused(level, level, "all poses are level");
   refused(good, fmt::format("{}z,0,0,0,0,0,0\n", kHead), "no pose has a target");
   refused(good + "far,0,0,300,0,0,0\n", targets + "far,0,0,300,0,0,0\n", "wanted 380 to 580 mm");
+}
+
+// A slip leaves words and no command, also where an earlier call left some.
+TEST_F(Compensate, PosesThatContradictTheMachineLeaveNoCommand) {
+  ASSERT_LE(run(table(1.5, 0.3), table(0, 0)).exit_code, 1);
+  std::string mirrored = kHead;
+  for (const PoseRecord& record : read_pose_table(write("straight.csv", table(1.5, 0.3)))) {
+    const Vector6d v = record.pose->vector();
+    mirrored += fmt::format("{},{},{},{},{},{},{}\n", record.id, v[0], -v[1], v[2], -v[3] * kDegPerRad,
+                            v[4] * kDegPerRad, -v[5] * kDegPerRad);
+  }
+  const CommandResult r = run(mirrored, table(0, 0));
+  EXPECT_EQ(r.exit_code, 1) << r.err;
+  EXPECT_THAT(r.out,
+              AllOf(HasSubstr("no command is given"), HasSubstr("left-handed frame"), HasSubstr("next:")));
+  for (const char* name : {"actuators.csv", "predicted_poses.csv"}) {
+    const std::string text = contents(folder_.path() / "out" / name);
+    EXPECT_THAT(text, HasSubstr("withheld: the measured poses contradict hexapod.yaml"));
+    EXPECT_THAT(text, Not(HasSubstr(",ok")));
+  }
+  EXPECT_THAT(contents(folder_.path() / "out/model.yaml"), HasSubstr("nominal"));
 }
 
 // Turned towards the machine's singular pose, and far from what the others say.

@@ -166,6 +166,12 @@ void judge_remainder(const CalibrationReport& calibration, const CrossValidation
 void judge_compensation(const CampaignEvidence& evidence, const CrossValidation& method,
                         CampaignVerdict& verdict) {
   const CalibrationReport& calibration = *evidence.calibration;
+  if (calibration.doubt) {
+    verdict.headline =
+        "The measured poses and hexapod.yaml do not speak of one machine: no command is given.";
+    verdict.findings.emplace_back(calibration.doubt->cause(), calibration.doubt->instruction, Severity::bad);
+    return;
+  }
   const double noise_mm = median_of(evidence.poses, position_sigma);
   if (const CrossValidation* nothing = doing_nothing(calibration)) {
     if (beats(method, *nothing)) {

@@ -160,9 +160,7 @@ int run_compensate(CompensateFlags flags) {
   std::vector<Target> targets;
   if (!flags.apply.empty() || !flags.targets.empty())
     targets = read_targets(flags.apply.empty() ? flags.targets : flags.apply);
-  const FittedMethod& fitted = report.fitted;
-  const std::vector<CorrectedCommand> commands =
-      compensate(fitted.model, targets, fitted.identified ? &*fitted.identified : nullptr);
+  const std::vector<CorrectedCommand> commands = corrected_commands(report, targets);
   const fs::path folder = flags.round > 1 ? flags.out / fmt::format("round{}", flags.round) : flags.out;
   inputs.push_back(flags.apply);
   std::erase_if(inputs, [](const fs::path& path) { return path.empty(); });
@@ -172,9 +170,9 @@ int run_compensate(CompensateFlags flags) {
                               : compensation_text(report, table, commands, written));
   if (!flags.json && !flags.campaign.empty())
     suggest_next("hexcal report " + shell_word(flags.campaign.string()));
-  const bool all_ok =
-      table.left_out.empty() && std::all_of(commands.begin(), commands.end(),
-                                            [](const auto& c) { return c.status == CommandStatus::ok; });
+  const bool all_ok = !report.doubt && table.left_out.empty() &&
+                      std::all_of(commands.begin(), commands.end(),
+                                  [](const auto& c) { return c.status == CommandStatus::ok; });
   return all_ok ? kDone : kSomeFailed;
 }
 

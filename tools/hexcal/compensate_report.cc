@@ -113,6 +113,8 @@ const char* status_name(CommandStatus status) {
       return "joint_limit";
     case CommandStatus::no_pose:
       return "no_pose";
+    case CommandStatus::withheld:
+      return "withheld";
   }
   return "";
 }
@@ -166,6 +168,10 @@ std::string compensation_text(const CalibrationReport& report, const Observation
       comparison.leave_one_out ? "leave-one-out" : fmt::format("{}-fold cross-validation", comparison.folds));
   text += method_table(report);
   text += report.why + "\n";
+  if (report.doubt) {
+    text += coloured(fmt::format("no command is given: {}\n", report.doubt->cause()), Colour::bad);
+    text += fmt::format("next: {}\n", report.doubt->instruction);
+  }
   if (report.uncompensated && !report.evaluations.empty()) text += fmt::format("\n{}", paper_table(report));
   if (!report.outliers.empty())
     text += fmt::format("left out as near-singular outliers: {}\n", fmt::join(report.outliers, ", "));
@@ -177,6 +183,7 @@ std::string compensation_text(const CalibrationReport& report, const Observation
   int failed = 0;
   for (const CorrectedCommand& command : commands) {
     if (command.status == CommandStatus::ok) continue;
+    if (report.doubt) break;  // one reason for all, stated above
     if (++failed <= 10) text += fmt::format("{}: {}\n", command.id, command.reason);
   }
   if (failed > 10) text += fmt::format("and {} more targets that cannot be reached\n", failed - 10);
@@ -234,6 +241,11 @@ std::string compensation_json(const CalibrationReport& report, const Observation
   }
   out["outliers"] = report.outliers;
   out["unexplained"] = report.unexplained;
+  if (report.doubt) {
+    out["doubt"] = {{"cause", report.doubt->cause()},
+                    {"slip", report.doubt->slip},
+                    {"instruction", report.doubt->instruction}};
+  }
   for (const auto& pose : table.left_out)
     out["left_out"].push_back({{"pose", pose.id}, {"reason", pose.reason}});
   if (report.identifiability) out["identified"] = identified_json(report);

@@ -162,6 +162,11 @@ CalibrationReport report_of(const RecordJson& json) {
   }
   report.chosen = json.at("chosen").get<std::string>();
   report.why = json.at("why").get<std::string>();
+  if (json.contains("doubt")) {
+    const RecordJson& doubt = json.at("doubt");
+    report.doubt = MachineDoubt{doubt.at(0).get<std::string>(), doubt.at(1).get<std::string>(),
+                                doubt.at(2).get<std::string>()};
+  }
   if (json.contains("identified")) read_identified(json.at("identified"), report);
   return report;
 }
@@ -188,6 +193,7 @@ std::string calibration_record_text(const std::string& key, const CalibrationRep
                  {"methods", RecordJson::array()},
                  {"dropped", RecordJson::array()}};
   if (report.uncompensated) out["uncompensated"] = errors_json(*report.uncompensated);
+  if (report.doubt) out["doubt"] = {report.doubt->evidence, report.doubt->slip, report.doubt->instruction};
   for (const CrossValidation& method : report.comparison.methods)
     out["methods"].push_back(method_json(method));
   for (const PaperEvaluation& evaluation : report.evaluations)

@@ -104,15 +104,17 @@ struct Commands {
   Rows6 sigmas;
 };
 
-Commands commands_for(const CalibrationModel& model, const RowsIn& targets,
-                      const IdentifyResult* identified) {
+std::vector<Target> targets_of(const RowsIn& targets) {
   std::vector<Target> wanted;
   for (Eigen::Index i = 0; i < targets.rows(); ++i)
     wanted.push_back({std::to_string(i), pose_of_row(targets.row(i).transpose())});
-  const std::vector<CorrectedCommand> corrected = compensate(model, wanted, identified);
+  return wanted;
+}
+
+Commands rows_of_commands(const std::vector<CorrectedCommand>& corrected) {
   Commands out;
   for (Rows6* rows : {&out.readings, &out.predicted, &out.sigmas})
-    rows->setConstant(targets.rows(), 6, std::nan(""));
+    rows->setConstant(static_cast<Eigen::Index>(corrected.size()), 6, std::nan(""));
   for (std::size_t i = 0; i < corrected.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     const CorrectedCommand& command = corrected[i];
@@ -123,6 +125,11 @@ Commands commands_for(const CalibrationModel& model, const RowsIn& targets,
     if (command.sigma) out.sigmas.row(row) = to_deg(*command.sigma);
   }
   return out;
+}
+
+Commands commands_for(const CalibrationModel& model, const RowsIn& targets,
+                      const IdentifyResult* identified) {
+  return rows_of_commands(compensate(model, targets_of(targets), identified));
 }
 
 struct Identified {
@@ -299,13 +306,21 @@ void bind_calibration(py::module_& module) {
           "uncompensated", [](const Compensation& c) { return c.report.uncompensated; },
           "Errors before, or None without targets.")
       .def_property_readonly("outliers", [](const Compensation& c) { return c.report.outliers; })
+      .def_property_readonly(
+          "doubt",
+          [](const Compensation& c) {
+            return c.report.doubt
+                       ? std::optional(c.report.doubt->cause() + "; " + c.report.doubt->instruction)
+                       : std::nullopt;
+          },
+          "Why poses and machine contradict each other, so that no command is given; else None.")
       .def(
           "correct",
           [](const Compensation& c, const RowsIn& t) {
-            const FittedMethod& fitted = c.report.fitted;
-            return commands_for(fitted.model, t, fitted.identified ? &*fitted.identified : nullptr);
+            return rows_of_commands(corrected_commands(c.report, targets_of(t)));
           },
-          py::arg("targets"), "As Model.correct, with sigmas where the method knows them.");
+          py::arg("targets"),
+          "As Model.correct, with sigmas where the method knows them; no numbers where there is a doubt.");
   module.def(
       "compensate",
       [](const PlatformGeometry& machine, const ObservationSet& observations, const std::string& method,
