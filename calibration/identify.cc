@@ -26,6 +26,9 @@ constexpr int kMinPosesForRobust = 10;
 // noise or a tolerance (logarithm) that counts as none.
 constexpr double kSmallShare = 0.02;
 constexpr double kSettled = 0.02;
+constexpr double kGuessedLegSigmaMm = 0.1;
+// Standard deviations that an excess of the residuals must have to be one.
+constexpr double kSignificant = 1;
 
 // Curves of all legs run over the same part of the stroke, the part that any leg used: only so have they
 // something in common.
@@ -89,7 +92,9 @@ class Identification {
     frame_steps_ = free.widest;
     result_.corrections.setZero(result_.layout.size());
     result_.weights.assign(observations.poses.size(), 1.0);
-    noise_.leg_sigma_mm = options.leg_sigma_mm;
+    // With nothing known, all noises begin at a size that all of them may have.
+    const bool known = observations.covariance_known || !options.estimate_leg_sigma;
+    noise_.leg_sigma_mm = known ? options.leg_sigma_mm : kGuessedLegSigmaMm;
     result_.stroke_range = stroke_range_of(nominal, observations);
   }
 
@@ -109,13 +114,17 @@ class Identification {
     for (std::size_t i = 0; i < filled_.size(); ++i) filled_[i] = observations_.poses[i].measured;
     // The parameters converge first, then the noise beside them, then the tolerances beside both: residuals
     // of a fit that has not converged would pass for noise, and noise for tolerances that are too wide.
-    enum class Phase { parameters, noise, tolerances, settled };
+    // Tolerances come first, once: what tolerances that are too narrow leave would pass for noise, and noise
+    // of that size for a reason to keep them narrow.
+    enum class Phase { parameters, first_tolerances, noise, tolerances, settled };
     Phase phase = Phase::parameters;
     int in_phase = 0;
     for (int i = 1; i <= options_.max_iterations; ++i) {
       result_.iterations = i;
-      adapt_tolerances_ = options_.adapt_tolerances && phase == Phase::tolerances;
-      if (!linearize() || !step(phase == Phase::noise || phase == Phase::tolerances)) return result_;
+      const bool hyper = phase != Phase::parameters && phase != Phase::settled;
+      adapt_tolerances_ = options_.adapt_tolerances && hyper && phase != Phase::noise;
+      adapt_noise_ = hyper && phase != Phase::first_tolerances;
+      if (!linearize() || !step(hyper)) return result_;
       ++in_phase;
       const auto advance = [&](Phase next) {
         phase = next;
@@ -123,13 +132,17 @@ class Identification {
       };
       switch (phase) {
         case Phase::parameters:
-          if (step_squares_ < 1e-3 * rows_ || in_phase == 12) advance(Phase::noise);
+          if (step_squares_ < 1e-3 * rows_ || in_phase == 12)
+            advance(start == nullptr ? Phase::first_tolerances : Phase::noise);
+          break;
+        case Phase::first_tolerances:
+          if (hyper_change_ < 0.05 || in_phase == 15) advance(Phase::noise);
           break;
         case Phase::noise:
           if (hyper_change_ < 0.05 || in_phase == 10) advance(Phase::tolerances);
           break;
         case Phase::tolerances:
-          if (hyper_change_ < kSettled || in_phase == 30) advance(Phase::settled);
+          if (hyper_change_ < kSettled || in_phase == 60) advance(Phase::settled);
           break;
         case Phase::settled:
           if (step_squares_ < 1e-16 * std::max(1.0, rows_)) {
@@ -264,14 +277,24 @@ class Identification {
     update_weights();
     // Without redundancy the residuals say nothing about noise.
     const double redundancy = equations_.rows - equations_.information.cwiseProduct(covariance_).sum();
-    if (redundancy > 3) {
+    if (adapt_noise_ && redundancy > 3) {
       if (!observations_.covariance_known) {
         scaled_by(noise_.position_factor, equations_.position.factor(covariance_), 1e-6, 1e6);
         scaled_by(noise_.orientation_factor, equations_.orientation.factor(covariance_), 1e-6, 1e6);
+        // The legs' noise looks otherwise than the measurement's: it has no stiff and no soft directions.
+        if (options_.estimate_leg_sigma)
+          scaled_by(noise_.leg_sigma_mm, equations_.leg.factor(covariance_), 1e-4, 1e3);
       } else if (options_.estimate_leg_sigma) {
-        scaled_by(noise_.leg_sigma_mm, equations_.leg.factor(covariance_), 0.01 * options_.leg_sigma_mm, 1e3);
-        // Where measuring noise is nearly all there is, the rest differs in nothing.
-        if (equations_.leg.trace < kSmallShare * equations_.rows) hyper_change_ = 0;
+        // Foerstner's factor belongs to a component that makes up all of the noise. Where it is a part, the
+        // same excess of the residuals needs a larger step.
+        const double factor = equations_.leg.factor(covariance_);
+        const double share = equations_.leg.trace / std::max(1e-300, equations_.rows);
+        const double step = factor > 1 ? 1 + (factor - 1) / std::min(1.0, share) : factor;
+        // Where measuring noise is nearly all there is, the legs' own differs in nothing, and an excess that
+        // may be chance is no reason to raise it.
+        const bool by_chance = factor < 1 + kSignificant * std::sqrt(2 / redundancy);
+        if (share >= kSmallShare || !by_chance)
+          scaled_by(noise_.leg_sigma_mm, step, 0.01 * options_.leg_sigma_mm, 1e3);
       }
     }
     if (!adapt_tolerances_) return;
@@ -369,6 +392,7 @@ class Identification {
   double step_squares_ = kInfinity;
   double hyper_change_ = 0;
   bool adapt_tolerances_ = false;
+  bool adapt_noise_ = false;
 };
 
 }  // namespace

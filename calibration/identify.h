@@ -39,7 +39,7 @@ struct IdentifyOptions {
   double leg_sigma_mm = 0.001;
   bool estimate_leg_sigma = true;
   bool robust = true;  ///< down-weight poses whose residual does not fit the others
-  int max_iterations = 80;
+  int max_iterations = 120;
 
   /// Throws InputError naming the field, or a parameter that does not exist.
   void validate() const;
@@ -79,7 +79,8 @@ struct IdentifyResult {
 ///   J Cov(pose) J^T + sigma_l^2 I
 /// (to first order the forward-kinematic pose residual; leg residuals: Zhuang, Yan and Masory, J. Robot.
 /// Syst. 15 (1998) 395), with tolerances as priors. Gauss-Newton on analytic Jacobians; noise that is not
-/// known is estimated by restricted maximum likelihood (Foerstner's iteration), tolerances by evidence
+/// known (of the legs, and without given covariances of positions and angles too) is estimated by restricted
+/// maximum likelihood (Foerstner's iteration), tolerances by evidence
 /// (MacKay, Neural Comput. 4 (1992) 415). With unknown frames the gauge is that of least corrections of the
 /// joints (in units of their tolerance) to nominal. `start`: where the iterations begin, what was identified
 /// with the same nominal machine and options from nearly the same observations; a few iterations are then

@@ -52,6 +52,35 @@ Undo of_drawing(std::function<void(PlatformGeometry&)> change) {
   };
 }
 
+// Positions divided by their mean ratio to the targets', where that is far from 1.
+std::optional<ReadOtherwise> in_the_targets_scale(const PlatformGeometry& nominal,
+                                                  const ObservationSet& observations) {
+  constexpr double kFarFromOne = 0.05;
+  ReadOtherwise other{nominal, complete_poses(observations)};
+  Eigen::Vector3d measured = Eigen::Vector3d::Zero();
+  Eigen::Vector3d wanted = Eigen::Vector3d::Zero();
+  double count = 0;
+  for (const PoseObservation& pose : other.observations.poses) {
+    if (!pose.target) continue;
+    measured += pose.measured.position_mm;
+    wanted += pose.target->position_mm;
+    count += 1;
+  }
+  if (count == 0) return std::nullopt;
+  double product = 0;
+  double square = 0;
+  for (const PoseObservation& pose : other.observations.poses) {
+    if (!pose.target) continue;
+    const Eigen::Vector3d target = pose.target->position_mm - wanted / count;
+    product += target.dot(pose.measured.position_mm - measured / count);
+    square += target.squaredNorm();
+  }
+  const double ratio = product / square;
+  if (!(ratio > 0) || std::abs(ratio - 1) < kFarFromOne) return std::nullopt;
+  for (PoseObservation& pose : other.observations.poses) pose.measured.position_mm /= ratio;
+  return other;
+}
+
 void add_units(std::vector<SuspectConvention>& list) {
   struct Unit {
     const char* name;
@@ -74,6 +103,9 @@ void add_units(std::vector<SuspectConvention>& list) {
                       return pose;
                     })});
   }
+  list.push_back({"everything that was measured has another scale than the targets",
+                  "look at the sizes and the scale in campaign.yaml and at mm_per_unit in hexapod.yaml",
+                  in_the_targets_scale});
   list.push_back({"the measured angles are in radians", "write them in degrees", of_each_pose([](Pose pose) {
                     pose.rpy_rad *= kDegPerRad;
                     return pose;

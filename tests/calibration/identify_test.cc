@@ -179,6 +179,48 @@ TEST(Identify, SigmasAreHonest) {
   EXPECT_LE(rms, 1.2);
 }
 
+// Play of the legs is told from the noise of the measurement, whether the latter's sigmas are given or not:
+// errors of corrected commands are as large as predicted (machines, poses and faults side by side:
+// calibration_accuracy --honesty).
+TEST(Identify, PredictedErrorsAreHonestWithPlayAndWithoutSigmas) {
+  const PlatformGeometry nominal = surrogate_hexapod();
+  std::normal_distribution<double> normal;
+  for (const bool known : {true, false}) {
+    for (const double play_mm : {0.0, 0.05}) {
+      double squares = 0;
+      double count = 0;
+      for (unsigned seed = 1; seed <= 25; ++seed) {
+        std::mt19937_64 rng(seed);
+        const MachineModel truth = as_built(nominal, {}, seed);
+        const auto reach = [&](LegVector readings) {
+          for (double& reading : readings) reading += play_mm * normal(rng);
+          return machine_pose(truth, readings);
+        };
+        ObservationSet set = measured(truth, nominal, random_poses(24, {}, 100 + seed), {0, 0, 1});
+        set.covariance_known = known;
+        Vector6d sigma;
+        sigma << Eigen::Vector3d::Constant(0.05), Eigen::Vector3d::Constant(0.01 * kRadPerDeg);
+        for (PoseObservation& pose : set.poses) {
+          Vector6d v = reach(pose.readings)->vector();
+          for (Eigen::Index k = 0; k < 6; ++k) v[k] += sigma[k] * normal(rng);
+          pose.measured = Pose::from_vector(v);
+          pose.covariance = sigma.cwiseAbs2().asDiagonal();
+          if (!known) pose.covariance *= 9;  // a guess
+        }
+        const IdentifyResult result = identify(nominal, set);
+        ASSERT_EQ(result.status, IdentifyStatus::identified) << result.reason;
+        for (const Pose& target : random_poses(10, {}, 900 + seed)) {
+          const Vector6d error = pose_error(*reach(machine_readings(result.machine, target)), target);
+          squares += error.cwiseQuotient(predicted_sigma(result, target)).squaredNorm();
+          count += 6;
+        }
+      }
+      EXPECT_GE(squares / count, 0.75) << "sigmas given " << known << ", play " << play_mm;
+      EXPECT_LE(squares / count, 1.3) << "sigmas given " << known << ", play " << play_mm;
+    }
+  }
+}
+
 TEST(Identify, UnknownFramesAreFound) {
   const PlatformGeometry nominal = surrogate_hexapod();
   const MachineModel truth = as_built(nominal, {}, 4);

@@ -106,6 +106,7 @@ std::vector<Slip> slips() {
       {"inches", scaled(1 / 25.4), "in inches"},
       {"cm", scaled(0.1), "in centimetres"},
       {"um", scaled(1000), "in um"},
+      {"a print 20 % too large", scaled(1.2), "another scale"},
       {"targets in inches", scaled(25.4), "targets' positions are in inches"},
       {"radians", poses([](Pose pose) {
          pose.rpy_rad *= kRadPerDeg;
