@@ -28,7 +28,7 @@ struct KnownLength {
 struct NominalPoint {
   MarkerPoint point;
   Eigen::Vector3d xyz_mm = Eigen::Vector3d::Zero();
-  double sigma_mm = 0;  ///< per axis
+  double sigma_mm = 0;  ///< per axis; 0: not stated, the fit tells it
 };
 
 /// The markers glued on one body: edge of the black square in mm by id.

@@ -28,7 +28,8 @@ void judge_failed_poses(CampaignResult& result) {
   if (!result.has_moving) return;
   std::vector<std::string> failed;
   for (const MeasuredPose& pose : result.poses) {
-    if (!is_measured(pose.status)) failed.push_back(pose.id);
+    // Without a datum no photograph is to blame.
+    if (!is_measured(pose.status) && pose.status != PoseStatus::no_datum) failed.push_back(pose.id);
   }
   if (failed.empty()) return;
   const bool most = 2 * failed.size() > result.poses.size();
@@ -119,6 +120,20 @@ void judge_length(const char* kind, const MeasuredLength& length, CampaignResult
   if (contradicts) suspect_all(result, fmt::format("{} is {:+.3g} mm off ({:.1f} sigma)", name, off, sigmas));
 }
 
+void judge_datum(const char* name, const DatumFrame& frame, CampaignResult& result) {
+  const bool missed = std::any_of(result.poses.begin(), result.poses.end(), [](const MeasuredPose& pose) {
+    return pose.status == PoseStatus::no_datum;
+  });
+  if (missed && !frame.ok && frame.reason != DatumFrame().reason) {
+    result.findings.emplace_back(fmt::format("{}: {}", name, frame.reason), frame.instruction, Severity::bad);
+  }
+  for (const std::string& note : frame.notes) result.findings.emplace_back(fmt::format("{}: {}", name, note));
+  if (frame.contradiction.empty()) return;
+  result.findings.emplace_back(fmt::format("{}: {}", name, frame.contradiction), frame.instruction,
+                               Severity::bad);
+  suspect_all(result, fmt::format("{}: {}", name, frame.contradiction));
+}
+
 }  // namespace
 
 void judge_campaign(const Campaign& campaign, CampaignResult& result) {
@@ -135,10 +150,8 @@ void judge_campaign(const Campaign& campaign, CampaignResult& result) {
     }
   }
   for (const MeasuredLength& check : result.checks) judge_length("check", check, result);
-  for (const DatumFrame* frame : {&result.UG, &result.LG}) {
-    for (const std::string& note : frame->notes)
-      result.findings.emplace_back(fmt::format("{}: {}", frame == &result.UG ? "UG" : "LG", note));
-  }
+  judge_datum("UG", result.UG, result);
+  judge_datum("LG", result.LG, result);
 }
 
 Severity overall_verdict(const CampaignResult& result) {

@@ -3,12 +3,13 @@
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
 #include "kinematics/geometry/covariance.h"
 #include "kinematics/geometry/median.h"
+#include "pose_extract/nominal_points.h"
+#include "pose_extract/nominal_slips.h"
 
 namespace hexcal {
 namespace {
@@ -16,105 +17,142 @@ namespace {
 constexpr int kIterations = 30;
 constexpr double kOutlierSigmas = 5.0;
 constexpr double kNarrowest = 0.01;  // least width over length of the points that set a frame
-
-struct DatumPoint {
-  const NominalPoint* nominal = nullptr;
-  Eigen::Vector3d in_body;
-  Eigen::Matrix3Xd by_error;
-  Eigen::Matrix3d covariance;  // of in_body
-  bool used = true;
-};
-
-using Matrix37d = Eigen::Matrix<double, 3, 7>;
-using Vector7d = Eigen::Matrix<double, 7, 1>;
-using Matrix7d = Eigen::Matrix<double, 7, 7>;
-
-std::vector<DatumPoint> collect_points(const Network& network, const AdjustmentResult& adjusted, int body,
-                                       const std::vector<NominalPoint>& nominal) {
-  std::vector<DatumPoint> points;
-  for (const NominalPoint& known : nominal) {
-    const int marker = measured_marker(network, adjusted, body, known.point.id);
-    if (marker < 0) continue;
-    DatumPoint point;
-    point.nominal = &known;
-    EstimatedPoint estimate = adjusted.point(marker, known.point.corner);
-    point.in_body = estimate.in_body;
-    point.covariance = estimate.covariance();
-    point.by_error = std::move(estimate.by_error);
-    points.push_back(std::move(point));
-  }
-  return points;
-}
-
-Matrix37d jacobian_at(const Rigid3& frame_from_body, double scale, const Eigen::Vector3d& in_body) {
-  const Eigen::Vector3d turned = frame_from_body.rotation * (scale * in_body);
-  Matrix37d j;
-  j << Eigen::Matrix3d::Identity(), -skew(turned), turned;
-  return j;
-}
-
-Eigen::Matrix3d weight_of(const DatumPoint& point, const Rigid3& frame_from_body) {
-  const Eigen::Matrix3d r = frame_from_body.rotation_matrix();
-  return (point.nominal->sigma_mm * point.nominal->sigma_mm * Eigen::Matrix3d::Identity() +
-          r * point.covariance * r.transpose())
-      .inverse();
-}
-
-// Start from every triple of a few spread points; the one with the least median residual wins, so that up to
-// half of the nominal coordinates may be wrong. False if no triple spans a triangle.
-bool start_robustly(const std::vector<DatumPoint>& points, bool with_scale, DatumFrame& frame) {
-  const std::size_t n = points.size();
-  const std::size_t stride = std::max<std::size_t>(1, n / 12);
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t a = 0; a < n; a += stride) {
-    for (std::size_t b = a + 1; b < n; b += stride) {
-      for (std::size_t c = b + 1; c < n; c += stride) {
-        Eigen::Matrix3d from;
-        Eigen::Matrix3d to;
-        const std::size_t pick[3] = {a, b, c};
-        for (int i = 0; i < 3; ++i) {
-          from.col(i) = points[pick[i]].in_body;
-          to.col(i) = points[pick[i]].nominal->xyz_mm;
-        }
-        const Eigen::Vector3d u = from.col(1) - from.col(0);
-        const Eigen::Vector3d v = from.col(2) - from.col(0);
-        if (u.cross(v).norm() < 0.05 * u.norm() * v.norm() || u.norm() < 1e-6) continue;
-        const Eigen::Matrix4d t = Eigen::umeyama(from, to, with_scale);
-        const double scale = std::cbrt(t.topLeftCorner<3, 3>().determinant());
-        if (!(scale > 0)) continue;
-        const Rigid3 motion(Eigen::Matrix3d(t.topLeftCorner<3, 3>() / scale), t.topRightCorner<3, 1>());
-        std::vector<double> off;
-        for (const DatumPoint& point : points) {
-          off.push_back((motion * (scale * point.in_body) - point.nominal->xyz_mm).norm());
-        }
-        const double value = median(off);
-        if (value >= least) continue;
-        least = value;
-        frame.frame_from_body = motion;
-        frame.scale = scale;
-      }
-    }
-  }
-  return std::isfinite(least);
-}
+// Of coordinates that state no sigma: a good coordinate measuring machine's, unless few stickers leave it to
+// a hand.
+constexpr double kUnstatedSigmaMm = 0.01;
+constexpr std::size_t kFewStickers = 10;
+// Size of the markers over that of nominal coordinates: no printer is farther off, a wrong unit is.
+constexpr double kBeyondPrinter = 0.1;
+// With more of the points wrong than this, the rest is no more trusted.
+constexpr double kFewWrong = 1.0 / 3;
 
 // The used points leave the turn about a line open, as good as.
-bool on_a_line(const std::vector<DatumPoint>& points) {
+bool on_a_line(const std::vector<NominalSticker>& stickers) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  double count = 0;
-  for (const DatumPoint& point : points) {
-    if (!point.used) continue;
-    mean += point.in_body;
-    count += 1;
+  std::vector<Eigen::Vector3d> points;
+  for (const NominalSticker& sticker : stickers) {
+    for (std::size_t i = 0; i < sticker.points.size(); ++i) {
+      if (!sticker.used[i]) continue;
+      points.emplace_back(sticker.in_body.col(static_cast<Eigen::Index>(i)));
+      mean += points.back();
+    }
   }
-  mean /= count;
+  mean /= static_cast<double>(points.size());
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-  for (const DatumPoint& point : points) {
-    if (point.used) scatter += (point.in_body - mean) * (point.in_body - mean).transpose();
-  }
+  for (const Eigen::Vector3d& point : points) scatter += (point - mean) * (point - mean).transpose();
   const Eigen::Vector3d spread =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter, Eigen::EigenvaluesOnly).eigenvalues();
   return !(spread[1] > kNarrowest * kNarrowest * spread[2]);
+}
+
+double assumed_sigma(const NominalPoint& point, std::size_t stickers) {
+  if (point.sigma_mm > 0) return point.sigma_mm;
+  return stickers < kFewStickers ? kHandPlacement.shift_mm : kUnstatedSigmaMm;
+}
+
+std::size_t count_used(const std::vector<NominalSticker>& stickers) {
+  std::size_t used = 0;
+  for (const NominalSticker& sticker : stickers)
+    used += static_cast<std::size_t>(std::count(sticker.used.begin(), sticker.used.end(), 1));
+  return used;
+}
+
+// Takes out points that are wrong, judged one by one by what is promised of them or, where nearly all break
+// that promise, by the others. The reason why too few are left, or nothing.
+std::string choose_used_points(std::vector<NominalSticker>& stickers, NominalFit& fit) {
+  for (int i = 0; i < kIterations; ++i) {
+    const Eigen::Matrix3d r = fit.scale * fit.frame_from_body.rotation_matrix();
+    std::vector<double> normalised;
+    for (const NominalSticker& sticker : stickers) {
+      for (std::size_t p = 0; p < sticker.points.size(); ++p) {
+        const auto at = static_cast<Eigen::Index>(p);
+        const double sigma = assumed_sigma(sticker.points[p], stickers.size());
+        const Eigen::Matrix3d covariance = sigma * sigma * Eigen::Matrix3d::Identity() +
+                                           r * sticker.covariance.block<3, 3>(3 * at, 3 * at) * r.transpose();
+        const Eigen::Vector3d off =
+            sticker.points[p].xyz_mm - fit.frame_from_body * (fit.scale * sticker.in_body.col(at));
+        normalised.push_back(std::sqrt(off.dot(covariance.inverse() * off) / 3));
+      }
+    }
+    const double limit = kOutlierSigmas * std::max(1.0, median(normalised));
+    std::size_t next = 0;
+    for (NominalSticker& sticker : stickers) {
+      for (char& used : sticker.used) used = normalised[next++] <= limit ? 1 : 0;
+    }
+    if (count_used(stickers) < 3) return "fewer than 3 of its nominal points agree with the measurement";
+    if (on_a_line(stickers))
+      return "those of its nominal points that agree with the measurement lie on a line";
+    if (improve_fit(stickers, fit) < 1e-12) break;
+  }
+  return "";
+}
+
+// Fewer than three of the points were measured: of another body, perhaps.
+void refuse_too_few(const Network& network, const AdjustmentResult& adjusted, int body,
+                    const std::vector<NominalPoint>& nominal, std::size_t measured, double limit_mm,
+                    DatumFrame& frame) {
+  const int other = body == kReferenceBody ? kMovingBody : kReferenceBody;
+  const auto of_other = std::count_if(nominal.begin(), nominal.end(), [&](const NominalPoint& point) {
+    return measured_marker(network, adjusted, other, point.point.id) >= 0;
+  });
+  frame.reason = fmt::format("only {} of the {} nominal points were measured, wanted at least 3", measured,
+                             nominal.size());
+  if (of_other >= 3) {
+    frame.reason += fmt::format("; {} are on the other grip", of_other);
+    frame.instruction = "give each frame the file of its own grip: two may be exchanged";
+  } else if (const auto slip = find_slip(network, adjusted, body, nominal, 2 * limit_mm, limit_mm)) {
+    // Ids may be so far off that none is left.
+    frame.reason += fmt::format("; they are {}", slip->words);
+    frame.instruction = slip->instruction;
+  }
+}
+
+// Sets the reason if the coordinates are beyond reason, or fit far better under a slip.
+bool refused_as_slip(const Network& network, const AdjustmentResult& adjusted, int body,
+                     const std::vector<NominalPoint>& nominal, const RobustMotion& as_listed, double limit_mm,
+                     DatumFrame& frame) {
+  double misfit_mm = as_listed.median_mm;
+  const bool other_size = std::abs(std::log(as_listed.scale)) > kBeyondPrinter;
+  if (other_size) misfit_mm = std::max(misfit_mm, 2 * limit_mm);
+  const auto slip = find_slip(network, adjusted, body, nominal, misfit_mm, limit_mm);
+  if (slip) {
+    frame.reason = fmt::format("its nominal coordinates are {}", slip->words);
+    if (!other_size) {
+      frame.reason += fmt::format(" (as listed they miss the markers by {:.3g} mm, so by {:.2g} mm)",
+                                  as_listed.median_mm, slip->left_mm);
+    }
+    frame.instruction = slip->instruction;
+    return true;
+  }
+  if (as_listed.median_mm <= limit_mm) return false;
+  frame.reason = fmt::format(
+      "its nominal coordinates miss the markers by {:.3g} mm (median), and no placement by hand is beyond "
+      "{:.2g} mm",
+      as_listed.median_mm, limit_mm);
+  frame.instruction = "compare ids, corners, axes and unit of the table with the grip";
+  return true;
+}
+
+// What should be known of a datum that holds.
+void remark_nominal(const std::vector<NominalSticker>& stickers, const NominalFit& fit, DatumFrame& frame) {
+  bool stated = true;
+  std::size_t points = 0;
+  for (const NominalSticker& sticker : stickers) {
+    for (const NominalPoint& point : sticker.points) stated = stated && point.sigma_mm > 0;
+    points += sticker.points.size();
+  }
+  if (fit.placement.shift_mm > 0 && stated) {
+    frame.notes.push_back(fmt::format(
+        "its markers lie {:.2g} mm (1 sigma) off their nominal coordinates, more than the sigma_mm "
+        "stated; the poses' sigmas hold it",
+        fit.placement.shift_mm));
+  }
+  const std::vector<std::string> left_out = words_of_left_out(stickers, fit);
+  frame.notes.insert(frame.notes.end(), left_out.begin(), left_out.end());
+  const std::size_t wrong = points - count_used(stickers);
+  if (static_cast<double>(wrong) > kFewWrong * static_cast<double>(points)) {
+    frame.contradiction = fmt::format("{} of its {} nominal points contradict the others", wrong, points);
+  }
 }
 
 }  // namespace
@@ -132,77 +170,74 @@ int measured_marker(const Network& network, const AdjustmentResult& adjusted, in
 DatumFrame frame_from_nominal(const Network& network, const AdjustmentResult& adjusted, int body,
                               const std::vector<NominalPoint>& nominal, bool with_scale) {
   DatumFrame frame;
-  std::vector<DatumPoint> points = collect_points(network, adjusted, body, nominal);
-  if (points.size() < 3) {
-    frame.reason = fmt::format("only {} of the {} nominal points were measured, wanted at least 3",
-                               points.size(), nominal.size());
+  std::vector<NominalSticker> stickers = nominal_stickers(network, adjusted, body, nominal);
+  std::vector<double> sigmas;
+  Eigen::Matrix3Xd from(3, 0);
+  Eigen::Matrix3Xd to(3, 0);
+  for (const NominalSticker& sticker : stickers) {
+    for (std::size_t i = 0; i < sticker.points.size(); ++i) {
+      from.conservativeResize(3, from.cols() + 1);
+      to.conservativeResize(3, to.cols() + 1);
+      from.rightCols<1>() = sticker.in_body.col(static_cast<Eigen::Index>(i));
+      to.rightCols<1>() = sticker.points[i].xyz_mm;
+      sigmas.push_back(sticker.points[i].sigma_mm);
+    }
+  }
+  const double limit_mm = std::max(kBeyondHandMm, kOutlierSigmas * median(sigmas));
+  if (from.cols() < 3) {
+    refuse_too_few(network, adjusted, body, nominal, static_cast<std::size_t>(from.cols()), limit_mm, frame);
     return frame;
   }
-  if (!start_robustly(points, with_scale, frame)) {
+  const auto start = robust_motion(from, to, with_scale);
+  if (!start) {
     frame.reason = "its nominal points lie on a line";
     return frame;
   }
-  Matrix7d inverse_normal = Matrix7d::Zero();
-  for (int i = 0; i < kIterations; ++i) {
-    // Robust scale: nominal sigmas may promise too much.
-    std::vector<double> normalised;
-    std::vector<Eigen::Vector3d> residuals;
-    for (const DatumPoint& point : points) {
-      const Eigen::Vector3d r = point.nominal->xyz_mm - frame.frame_from_body * (frame.scale * point.in_body);
-      residuals.push_back(r);
-      normalised.push_back(std::sqrt(r.dot(weight_of(point, frame.frame_from_body) * r) / 3));
-    }
-    const double limit = kOutlierSigmas * std::max(1.0, median(normalised));
-    Matrix7d normal = Matrix7d::Zero();
-    Vector7d right = Vector7d::Zero();
-    for (std::size_t p = 0; p < points.size(); ++p) {
-      points[p].used = normalised[p] <= limit;
-      if (!points[p].used) continue;
-      const Matrix37d j = jacobian_at(frame.frame_from_body, frame.scale, points[p].in_body);
-      const Eigen::Matrix3d w = weight_of(points[p], frame.frame_from_body);
-      normal += j.transpose() * w * j;
-      right += j.transpose() * w * residuals[p];
-    }
-    if (std::count_if(points.begin(), points.end(), [](const DatumPoint& p) { return p.used; }) < 3) {
-      frame.reason = "fewer than 3 of its nominal points agree with the measurement";
-      return frame;
-    }
-    if (on_a_line(points)) {
-      frame.reason = "those of its nominal points that agree with the measurement lie on a line";
-      return frame;
-    }
-    if (!with_scale) {
-      normal.row(6).setZero();
-      normal.col(6).setZero();
-      normal(6, 6) = 1;
-      right[6] = 0;
-    }
-    inverse_normal = normal.inverse();
-    const Vector7d step = inverse_normal * right;
-    frame.frame_from_body = perturbed(frame.frame_from_body, step.head<6>());
-    frame.scale *= std::exp(step[6]);
-    if (step.norm() < 1e-12) break;
+  if (refused_as_slip(network, adjusted, body, nominal, *start, limit_mm, frame)) return frame;
+  NominalFit fit;
+  fit.frame_from_body = start->motion;
+  fit.scale = start->scale;
+  fit.with_scale = with_scale;
+  frame.reason = choose_used_points(stickers, fit);
+  if (!frame.reason.empty()) return frame;
+  if (2 * count_used(stickers) < sigmas.size()) {
+    frame.reason = fmt::format("only {} of its {} nominal points agree with each other", count_used(stickers),
+                               sigmas.size());
+    frame.instruction = "compare ids, corners, axes and unit of the table with the grip";
+    return frame;
   }
+  fit_placement(stickers, fit);
+  std::vector<Eigen::MatrixXd> gains;
+  for (int i = 0; i < kIterations && improve_fit(stickers, fit, &gains) > 1e-12; ++i) {
+  }
+  if (std::abs(std::log(fit.scale)) > kBeyondPrinter) {
+    frame.reason = fmt::format(
+        "its nominal coordinates are {:.4g} times as large as the markers' size_mm say", fit.scale);
+    frame.instruction = "compare size_mm and the table with the grip";
+    return frame;
+  }
+  frame.frame_from_body = fit.frame_from_body;
+  frame.scale = fit.scale;
+  frame.placement = fit.placement;
   frame.by_error = Eigen::Matrix<double, 7, Eigen::Dynamic>::Zero(7, adjusted.num_errors());
-  const Eigen::Matrix3d rotation = frame.frame_from_body.rotation_matrix();
-  for (const DatumPoint& point : points) {
-    const Eigen::Vector3d measured = frame.frame_from_body * (frame.scale * point.in_body);
-    const Eigen::Matrix3d w = weight_of(point, frame.frame_from_body);
-    frame.residuals.push_back({point.nominal->point, measured - point.nominal->xyz_mm,
-                               std::sqrt(w.inverse().trace() / 3), point.used});
-    if (!point.used) {
-      frame.notes.push_back(fmt::format(
-          "nominal point {}{} is {:.3f} mm off and was left out", point.nominal->point.id,
-          point.nominal->point.corner < 0 ? std::string() : fmt::format(".{}", point.nominal->point.corner),
-          frame.residuals.back().residual_mm.norm()));
-      continue;
+  const Eigen::Matrix3d rotation = fit.scale * fit.frame_from_body.rotation_matrix();
+  for (std::size_t s = 0; s < stickers.size(); ++s) {
+    const NominalSticker& sticker = stickers[s];
+    const Eigen::MatrixXd covariance = nominal_covariance(sticker, fit, fit.placement);
+    frame.own += gains[s] * covariance * gains[s].transpose();
+    for (std::size_t i = 0; i < sticker.points.size(); ++i) {
+      const auto at = static_cast<Eigen::Index>(i);
+      frame.by_error -= gains[s].middleCols<3>(3 * at) * rotation * sticker.by_error.middleRows<3>(3 * at);
+      const Eigen::Matrix3d measured = sticker.covariance.block<3, 3>(3 * at, 3 * at);
+      const double sigma2 =
+          (covariance.block<3, 3>(3 * at, 3 * at).trace() + fit.scale * fit.scale * measured.trace()) / 3;
+      frame.residuals.push_back(
+          {sticker.points[i].point,
+           fit.frame_from_body * (fit.scale * sticker.in_body.col(at)) - sticker.points[i].xyz_mm,
+           std::sqrt(sigma2), sticker.used[i] != 0});
     }
-    Eigen::Matrix<double, 7, 3> gain =
-        inverse_normal * jacobian_at(frame.frame_from_body, frame.scale, point.in_body).transpose() * w;
-    if (!with_scale) gain.row(6).setZero();
-    frame.by_error -= gain * (frame.scale * rotation) * point.by_error;
-    frame.own += gain * (point.nominal->sigma_mm * point.nominal->sigma_mm) * gain.transpose();
   }
+  remark_nominal(stickers, fit, frame);
   frame.ok = true;
   frame.reason.clear();
   return frame;

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "photogrammetry/adjustment/adjustment.h"
-#include "pose_extract/campaign.h"
+#include "pose_extract/nominal_points.h"
 
 namespace hexcal {
 
@@ -23,16 +23,21 @@ struct DatumResidual {
 struct DatumFrame {
   bool ok = false;
   std::string reason = "not defined";  ///< why it is not ok
+  std::string instruction;             ///< what to do about that
+  std::string contradiction;           ///< what makes all poses that hang on it suspect; empty: nothing
   Rigid3 frame_from_body;              ///< applied to the body's coordinates times scale
   double scale = 1;                    ///< from nominal coordinates when asked for
   Eigen::Matrix<double, 7, Eigen::Dynamic> by_error;
   Eigen::Matrix<double, 7, 7> own = Eigen::Matrix<double, 7, 7>::Zero();
+  Placement placement;  ///< of its stickers, beyond the sigmas stated: in `own`
   std::vector<DatumResidual> residuals;
   std::vector<std::string> notes;  ///< form errors (flatness, roundness), rejected points
 };
 
 /// Weighted best fit (Helmert; with_scale adds the seventh parameter) of a body's measured points to nominal
-/// coordinates, never warping them; robust to wrong ones, which are listed.
+/// coordinates, never warping them; robust to wrong ones, which are listed. What the fit leaves says how its
+/// stickers were placed, where no sigma states it or the stated ones are contradicted. Coordinates that no
+/// placement by hand explains, or that a slip explains far better (nominal_slips.h), make no frame.
 [[nodiscard]] DatumFrame frame_from_nominal(const Network& network, const AdjustmentResult& adjusted,
                                             int body, const std::vector<NominalPoint>& nominal,
                                             bool with_scale);

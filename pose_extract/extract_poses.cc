@@ -409,6 +409,7 @@ CampaignResult extract_poses(const Campaign& campaign, const CampaignObservation
       result.LG.by_error = Eigen::Matrix<double, 7, Eigen::Dynamic>::Zero(7, result.adjusted.num_errors());
     } else {
       result.LG.reason = fmt::format("the home pose '{}' was not measured", observations.poses[home]);
+      result.LG.instruction = "photograph it again, or let another pose be the home: --home POSE";
     }
   }
   if (result.UG.ok && result.LG.ok) {

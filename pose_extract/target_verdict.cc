@@ -164,7 +164,13 @@ void judge_places(const std::map<std::string, Pose>& commanded, CampaignResult& 
 
 void judge_against_targets(const std::map<std::string, Pose>& commanded, CampaignResult& result) {
   judge_names(commanded, result);
-  if (!judge_axes(commanded, result)) judge_places(commanded, result);
+  if (!judge_axes(commanded, result)) {
+    judge_places(commanded, result);
+    return;
+  }
+  for (MeasuredPose& pose : result.poses) {
+    if (pose.pose) suspect(pose, "its axes are not those of the targets");
+  }
 }
 
 }  // namespace hexcal

@@ -13,9 +13,6 @@
 namespace hexcal {
 namespace {
 
-// Sigma of nominal coordinates that state none: a good coordinate measuring machine's.
-constexpr double kNominalSigmaMm = 0.01;
-
 // `9` or `9.2`.
 MarkerPoint parse_point(const YamlMap& map, const std::string& key, const std::string& text) {
   const auto dot = text.find('.');
@@ -279,9 +276,10 @@ std::vector<NominalPoint> read_nominal_points(const std::filesystem::path& path)
     if (point.point.corner < -1 || point.point.corner > 3) table.fail(row, "corner", "wanted 0 to 3");
     if (!seen.insert(point.point).second) table.fail(row, "id", "this point stands twice");
     point.xyz_mm = {table.number(row, "x_mm"), table.number(row, "y_mm"), table.number(row, "z_mm")};
-    point.sigma_mm =
-        has_sigma ? table.optional_number(row, "sigma_mm").value_or(kNominalSigmaMm) : kNominalSigmaMm;
-    if (!(point.sigma_mm > 0)) table.fail(row, "sigma_mm", "wanted more than 0");
+    if (const auto sigma = has_sigma ? table.optional_number(row, "sigma_mm") : std::nullopt) {
+      if (!(*sigma > 0)) table.fail(row, "sigma_mm", "wanted more than 0");
+      point.sigma_mm = *sigma;
+    }
     points.push_back(point);
   }
   if (points.size() < 3) {

@@ -29,7 +29,8 @@ namespace hexcal {
 ///   checks                  [{a: 0, b: 5, length_mm: 182.41, sigma_mm: 0.01}]: compared, never used
 [[nodiscard]] Campaign read_campaign(const std::filesystem::path& folder_or_file);
 
-/// Nominal coordinates: id,corner,x_mm,y_mm,z_mm[,sigma_mm]; an empty corner is the marker's centre.
+/// Nominal coordinates: id,corner,x_mm,y_mm,z_mm[,sigma_mm]; an empty corner is the marker's centre, an empty
+/// sigma_mm (zero in the result) is left to the fit to tell.
 [[nodiscard]] std::vector<NominalPoint> read_nominal_points(const std::filesystem::path& path);
 
 /// The table of a flat folder: file,pose.
