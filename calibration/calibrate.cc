@@ -30,8 +30,7 @@ std::size_t choose_within(const MethodComparison& comparison, const std::string&
     double gain = 0;
     double squares = 0;
     const double n = static_cast<double>(methods[i].losses_mm2.size());
-    for (std::size_t p = 0; p < methods[i].losses_mm2.size(); ++p) {
-      const double d = methods[chosen].losses_mm2[p] - methods[i].losses_mm2[p];
+    for (const double d : loss_differences(methods[chosen], methods[i])) {
       gain += d / n;
       squares += d * d / n;
     }

@@ -43,10 +43,6 @@ constexpr double kLegSigmaMm = 0.3;
 // The paper's machine is off by up to 25 deg at home, in yaw.
 constexpr double kLargestHomeErrorRad = 40 * kRadPerDeg;
 
-double squares_mm2(const Vector6d& error, double length_mm) {
-  return error.head<3>().squaredNorm() + length_mm * length_mm * error.tail<3>().squaredNorm();
-}
-
 // The rms distance of the targets from their mean, mm.
 double spread_of(const ObservationSet& observations, double length_mm) {
   std::vector<Vector6d> targets;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <set>
@@ -43,10 +44,39 @@ std::vector<std::size_t> testable(const ObservationSet& observations) {
   return 2 * complete.size() >= all.size() ? complete : all;
 }
 
-// Poses spread over the folds in the order in which they were given: fold of pose i is i mod folds.
-std::vector<std::vector<std::size_t>> folds_of(const std::vector<std::size_t>& poses, std::size_t folds) {
+// Repeats of one pose would test what the others of them have taught. Each group holds poses whose readings
+// differ from the first one's by less than a hundredth of their spread.
+std::vector<std::vector<std::size_t>> groups_of(const ObservationSet& observations,
+                                                const std::vector<std::size_t>& poses) {
+  constexpr double kSameShare = 0.01;
+  LegVector low = LegVector::Constant(std::numeric_limits<double>::infinity());
+  LegVector high = -low;
+  for (const std::size_t i : poses) {
+    low = low.cwiseMin(observations.poses[i].readings);
+    high = high.cwiseMax(observations.poses[i].readings);
+  }
+  const double same = kSameShare * (high - low).maxCoeff();
+  std::vector<std::vector<std::size_t>> groups;
+  for (const std::size_t i : poses) {
+    const LegVector& readings = observations.poses[i].readings;
+    const auto group = std::ranges::find_if(groups, [&](const std::vector<std::size_t>& others) {
+      return (observations.poses[others.front()].readings - readings).cwiseAbs().maxCoeff() < same;
+    });
+    if (group == groups.end()) {
+      groups.push_back({i});
+    } else {
+      group->push_back(i);
+    }
+  }
+  return groups;
+}
+
+// Groups spread over the folds in the order in which they were given: fold of group i is i mod folds.
+std::vector<std::vector<std::size_t>> folds_of(const std::vector<std::vector<std::size_t>>& groups,
+                                               std::size_t folds) {
   std::vector<std::vector<std::size_t>> out(folds);
-  for (std::size_t i = 0; i < poses.size(); ++i) out[i % folds].push_back(poses[i]);
+  for (std::size_t i = 0; i < groups.size(); ++i)
+    out[i % folds].insert(out[i % folds].end(), groups[i].begin(), groups[i].end());
   return out;
 }
 
@@ -65,6 +95,12 @@ double loss_mm2(const PosePair& pair, double length_mm) {
   return mm * mm + arc_mm * arc_mm;
 }
 
+// What the measurement's noise alone may make of a pose's loss; nothing where it is not known.
+double noise_mm2(const ObservationSet& observations, std::size_t i, double length_mm) {
+  if (!observations.covariance_known) return 0;
+  return squares_mm2(observations.covariance(i).diagonal().cwiseMax(0.0).cwiseSqrt(), length_mm);
+}
+
 // `of_all`: the fit to all poses, from which those to the folds begin.
 CrossValidation validate(const PlatformGeometry& nominal, const ObservationSet& observations,
                          const Candidate& candidate, const std::vector<std::vector<std::size_t>>& folds,
@@ -76,6 +112,7 @@ CrossValidation validate(const PlatformGeometry& nominal, const ObservationSet& 
   of_all = fit_candidate(nominal, observations, candidate, &result.failure);
   if (!of_all) return result;
   const IdentifyResult* start = of_all->identified ? &*of_all->identified : nullptr;
+  const double length_mm = characteristic_length_mm(nominal);
   for (const auto& held_out : folds) {
     std::vector<std::size_t> kept;
     for (std::size_t i = 0; i < observations.poses.size(); ++i)
@@ -86,12 +123,20 @@ CrossValidation validate(const PlatformGeometry& nominal, const ObservationSet& 
       const PoseObservation& pose = observations.poses[i];
       const std::optional<Pose> expected = pose_for_readings(fitted->model, pose.readings, pose.approach);
       if (!expected) {
-        result.failure = fmt::format("no pose at the readings of '{}'", pose.id);
-        return result;
+        result.without_pose.push_back(i);
+        continue;
       }
+      double may_be = noise_mm2(observations, i, length_mm);
+      if (fitted->identified)
+        may_be += squares_mm2(predicted_sigma(*fitted->identified, *expected), length_mm);
+      result.expected_mm2.push_back(may_be);
       result.held_out.push_back({*expected, with_expected(pose, *expected)});
       result.held_out_index.push_back(i);
     }
+  }
+  if (4 * result.without_pose.size() > result.held_out.size()) {
+    result.failure =
+        fmt::format("no pose at the readings of '{}'", observations.poses[result.without_pose.front()].id);
   }
   return result;
 }
@@ -103,9 +148,10 @@ double median_loss(const CrossValidation& method, double length_mm) {
 }
 
 // Poses that no method explains: measured wrongly, or at other readings than the table says. Their least loss
-// lies far above the others'; more than a fifth of all are no exceptions. A model with as many numbers as the
-// poses that it is fitted to have coordinates predicts a pose from its tolerances alone: that it fails at one
-// accuses nobody.
+// lies far above the others' and, by as much, above what the noise of that pose and of the fit without it may
+// make it (a pose beyond all others is predicted badly by any model); more than a fifth of all are no
+// exceptions. A model with as many numbers as the poses that it is fitted to have coordinates predicts a pose
+// from its tolerances alone: that it fails at one accuses nobody.
 std::set<std::size_t> unexplained(const std::vector<CrossValidation>& methods, double length_mm,
                                   std::size_t poses_in_fit) {
   constexpr double kFarAboveMedian = 25;  // five times the median error
@@ -124,6 +170,16 @@ std::set<std::size_t> unexplained(const std::vector<CrossValidation>& methods, d
       if (!added) at->second = std::min(at->second, loss);
     }
   }
+  // Of the best method: loss over what it may be.
+  std::map<std::size_t, double> excess;
+  std::vector<double> ratios;
+  for (std::size_t p = 0; p < best->held_out.size(); ++p) {
+    const double loss = loss_mm2(best->held_out[p], length_mm);
+    ratios.push_back(best->expected_mm2[p] > 0 ? loss / best->expected_mm2[p]
+                                               : std::numeric_limits<double>::infinity());
+    excess[best->held_out_index[p]] = ratios.back();
+  }
+  const double usual = std::max(1.0, median(std::move(ratios)));
   std::vector<std::pair<double, std::size_t>> worst_first;
   for (const auto& [index, loss] : least) worst_first.emplace_back(-loss, index);
   std::sort(worst_first.begin(), worst_first.end());
@@ -132,29 +188,62 @@ std::set<std::size_t> unexplained(const std::vector<CrossValidation>& methods, d
     if (5 * (far.size() + 1) > worst_first.size() ||
         -loss <= kFarAboveMedian * -worst_first[worst_first.size() / 2].first)
       break;
-    far.insert(index);
+    const auto ratio = excess.find(index);
+    if (ratio == excess.end() || std::isinf(usual) || ratio->second > kFarAboveMedian * usual)
+      far.insert(index);
   }
   return far;
 }
 
+// Weight of each pose in the choice: the inverse of what its loss is by noise and by what the best model
+// lacks (the median loss beyond the noise). Equal where the noise is the same or not known.
+std::map<std::size_t, double> weights_of(const ObservationSet& observations,
+                                         const std::vector<std::size_t>& poses,
+                                         const std::vector<CrossValidation>& methods,
+                                         const std::set<std::size_t>& left_out, double length_mm) {
+  double lacks_mm2 = std::numeric_limits<double>::infinity();
+  for (const CrossValidation& method : methods) {
+    std::vector<double> beyond;
+    for (std::size_t p = 0; p < method.held_out.size(); ++p) {
+      if (left_out.count(method.held_out_index[p]) != 0) continue;
+      beyond.push_back(std::max(0.0, loss_mm2(method.held_out[p], length_mm) -
+                                         noise_mm2(observations, method.held_out_index[p], length_mm)));
+    }
+    if (method.failure.empty() && !beyond.empty()) lacks_mm2 = std::min(lacks_mm2, median(std::move(beyond)));
+  }
+  std::map<std::size_t, double> weights;
+  for (const std::size_t i : poses) {
+    const double variance = lacks_mm2 + noise_mm2(observations, i, length_mm);
+    weights[i] = variance > 0 && std::isfinite(variance) ? 1 / variance : 1;
+  }
+  return weights;
+}
+
 // Statistics of the held-out poses but those of `left_out`, which go.
-void summarise(CrossValidation& result, const std::set<std::size_t>& left_out, double length_mm) {
+void summarise(CrossValidation& result, const std::set<std::size_t>& left_out, double length_mm,
+               const std::map<std::size_t, double>& weight_of) {
   std::vector<PosePair> pairs;
   std::vector<std::size_t> indices;
   std::vector<double> position_squares;
   std::vector<double> orientation_squares;
+  std::vector<double> expected;
   for (std::size_t p = 0; p < result.held_out.size(); ++p) {
     if (left_out.count(result.held_out_index[p]) != 0) continue;
     const PosePair& pair = result.held_out[p];
     pairs.push_back(pair);
     indices.push_back(result.held_out_index[p]);
     result.losses_mm2.push_back(loss_mm2(pair, length_mm));
+    result.weights.push_back(weight_of.at(result.held_out_index[p]));
+    expected.push_back(result.expected_mm2[p]);
     position_squares.push_back((pair.actual.position_mm - pair.target.position_mm).squaredNorm());
     orientation_squares.push_back((result.losses_mm2.back() - position_squares.back()) /
                                   (length_mm * length_mm));
   }
   result.held_out = std::move(pairs);
   result.held_out_index = std::move(indices);
+  result.expected_mm2 = std::move(expected);
+  const double mean_weight = result.weights.empty() ? 1 : mean(result.weights);
+  for (double& weight : result.weights) weight /= mean_weight;
   result.poses = static_cast<int>(result.held_out.size());
   result.errors = error_statistics(result.held_out);
   // d sqrt(m) = dm / (2 sqrt(m)).
@@ -167,7 +256,18 @@ void summarise(CrossValidation& result, const std::set<std::size_t>& left_out, d
 
 }  // namespace
 
-double CrossValidation::mean_loss_mm2() const { return losses_mm2.empty() ? 0.0 : mean(losses_mm2); }
+double CrossValidation::mean_loss_mm2() const {
+  double sum = 0;
+  for (std::size_t p = 0; p < losses_mm2.size(); ++p) sum += weights[p] * losses_mm2[p];
+  return losses_mm2.empty() ? 0.0 : sum / static_cast<double>(losses_mm2.size());
+}
+
+std::vector<double> loss_differences(const CrossValidation& a, const CrossValidation& b) {
+  std::vector<double> differences;
+  for (std::size_t p = 0; p < a.losses_mm2.size(); ++p)
+    differences.push_back(a.weights[p] * (a.losses_mm2[p] - b.losses_mm2[p]));
+  return differences;
+}
 
 std::vector<Candidate> candidates_for(const ObservationSet& observations, const IdentifyOptions& base) {
   std::size_t complete = 0;
@@ -244,13 +344,14 @@ MethodComparison compare_methods(const PlatformGeometry& nominal, const Observat
                                  const std::vector<Candidate>& candidates, const ComparisonOptions& options) {
   MethodComparison comparison;
   const std::vector<std::size_t> poses = testable(observations);
-  comparison.leave_one_out = static_cast<int>(poses.size()) <= options.leave_one_out_up_to;
-  comparison.folds = comparison.leave_one_out ? static_cast<int>(poses.size()) : options.folds;
+  const std::vector<std::vector<std::size_t>> groups = groups_of(observations, poses);
+  comparison.leave_one_out = static_cast<int>(groups.size()) <= options.leave_one_out_up_to;
+  comparison.folds = comparison.leave_one_out ? static_cast<int>(groups.size()) : options.folds;
   // Options 1 to 3 know no frames but the hexapod's.
   const bool frames_unknown = !candidates.empty() && candidates.back().identify.frames_unknown;
   const ObservationSet seen_by_hexapod =
       frames_unknown ? in_hexapod_frames(nominal, observations) : observations;
-  const auto folds = folds_of(poses, static_cast<std::size_t>(std::max(1, comparison.folds)));
+  const auto folds = folds_of(groups, static_cast<std::size_t>(std::max(1, comparison.folds)));
   comparison.methods.resize(candidates.size());
   comparison.fitted.resize(candidates.size());
   tbb::parallel_for(
@@ -264,11 +365,16 @@ MethodComparison compare_methods(const PlatformGeometry& nominal, const Observat
       },
       tbb::simple_partitioner());
   const double length_mm = characteristic_length_mm(nominal);
-  const std::set<std::size_t> left_out =
+  std::set<std::size_t> left_out =
       unexplained(comparison.methods, length_mm,
                   poses.size() - (poses.size() + folds.size() - 1) / std::max<std::size_t>(1, folds.size()));
+  // All methods are compared over one set of poses.
+  for (const CrossValidation& method : comparison.methods)
+    if (method.failure.empty()) left_out.insert(method.without_pose.begin(), method.without_pose.end());
   comparison.unexplained.assign(left_out.begin(), left_out.end());
-  for (CrossValidation& method : comparison.methods) summarise(method, left_out, length_mm);
+  const std::map<std::size_t, double> weights =
+      weights_of(observations, poses, comparison.methods, left_out, length_mm);
+  for (CrossValidation& method : comparison.methods) summarise(method, left_out, length_mm, weights);
   const auto& methods = comparison.methods;
   const auto usable = [&](std::size_t i) { return methods[i].failure.empty() && methods[i].poses > 0; };
   for (std::size_t i = 0; i < methods.size(); ++i) {
@@ -279,9 +385,7 @@ MethodComparison compare_methods(const PlatformGeometry& nominal, const Observat
   comparison.chosen = comparison.best;
   for (std::size_t i = 0; i < methods.size(); ++i) {
     if (!usable(i) || methods[i].complexity >= methods[comparison.chosen].complexity) continue;
-    std::vector<double> difference;
-    for (std::size_t p = 0; p < methods[i].losses_mm2.size(); ++p)
-      difference.push_back(methods[i].losses_mm2[p] - methods[comparison.best].losses_mm2[p]);
+    const std::vector<double> difference = loss_differences(methods[i], methods[comparison.best]);
     if (mean(difference) <= standard_error(difference)) comparison.chosen = i;
   }
   comparison.why = comparison.chosen == comparison.best

@@ -55,10 +55,18 @@ struct CrossValidation {
   int targets_lost = 0;                       ///< targets whose corrected command breaks a limit
   /// Squared error of each pose, mm^2, rotations as arcs at the characteristic length; in pose order.
   std::vector<double> losses_mm2;
-  std::vector<PosePair> held_out;  ///< target: modelled, actual: measured
+  /// What each may be by the measurement's noise and, of kinematic, by what the fit knows of the parameters;
+  /// in the order of held_out.
+  std::vector<double> expected_mm2;
+  std::vector<double> weights;            ///< of the losses in every comparison of methods; their mean is 1
+  std::vector<std::size_t> without_pose;  ///< held-out observations at whose readings no pose was found
+  std::vector<PosePair> held_out;         ///< target: modelled, actual: measured
   std::vector<std::size_t> held_out_index;
-  double mean_loss_mm2() const;
+  double mean_loss_mm2() const;  ///< weighted
 };
+
+/// Weighted losses of a minus those of b, pose by pose.
+[[nodiscard]] std::vector<double> loss_differences(const CrossValidation& a, const CrossValidation& b);
 
 struct ComparisonOptions {
   int leave_one_out_up_to = 40;  ///< poses; more are held out in folds
@@ -78,10 +86,12 @@ struct MethodComparison {
   std::string why;                                  ///< one line
 };
 
-/// Cross-validates all candidates over the same folds. The error that would remain at a held-out pose is the
+/// Cross-validates all candidates over the same folds; poses of nearly the same readings are in one fold. The
+/// error that would remain at a held-out pose is the
 /// difference between the pose that the fitted model expects at the readings used and the pose measured: with
 /// the measured pose as a target, the model would have been wrong by that. The choice compares losses
-/// pairwise over poses (one-standard-error rule of Breiman et al. 1984 on the differences).
+/// pairwise over poses (one-standard-error rule of Breiman et al. 1984 on the differences), where sigmas were
+/// measured with weights: a pose that was measured badly says little.
 [[nodiscard]] MethodComparison compare_methods(const PlatformGeometry& nominal,
                                                const ObservationSet& observations,
                                                const std::vector<Candidate>& candidates,

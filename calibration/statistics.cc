@@ -39,6 +39,10 @@ ErrorStatistics error_statistics(std::span<const PosePair> pairs) {
   return s;
 }
 
+double squares_mm2(const Vector6d& error, double length_mm) {
+  return error.head<3>().squaredNorm() + length_mm * length_mm * error.tail<3>().squaredNorm();
+}
+
 double range_magnitude(const Eigen::Vector3d& ranges) { return std::sqrt(ranges.squaredNorm() / 3.0); }
 
 double improvement_percent(double before, double after) {

@@ -30,6 +30,9 @@ struct ErrorStatistics {
 /// Statistics over all pairs; of none, zeros.
 [[nodiscard]] ErrorStatistics error_statistics(std::span<const PosePair> pairs);
 
+/// Squared size of a pose error (or of its sigmas), mm^2: angles, in rad, as arcs at length_mm.
+[[nodiscard]] double squares_mm2(const Vector6d& error, double length_mm);
+
 /// Karmakar and Turner, eq. 7: the root mean square of three error ranges. It is no true rms: it weighs only
 /// the two extreme poses of each parameter and is blind to a constant error.
 [[nodiscard]] double range_magnitude(const Eigen::Vector3d& ranges);
