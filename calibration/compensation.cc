@@ -30,8 +30,14 @@ Vector6d predicted_sigma(const IdentifyResult& identified, const Pose& pose) {
   const ReducedPose reduced =
       reduce_to_observed(legs, {true, true, true, true, true, true}, identified.selection);
   const double leg_variance = identified.leg_sigma_mm * identified.leg_sigma_mm;
-  const Matrix6d leg_covariance = reduced.jacobian * identified.covariance * reduced.jacobian.transpose() +
-                                  leg_variance * Matrix6d::Identity();
+  Matrix6d leg_covariance = reduced.jacobian * identified.covariance * reduced.jacobian.transpose() +
+                            leg_variance * Matrix6d::Identity();
+  if (identified.drift) {
+    // The model is that of the middle of the campaign; the machine stands where it ended, or farther.
+    const Vector6d moved =
+        legs.jacobian.middleCols<6>(ParameterLayout::kBaseFrame) * identified.drift->motion / 2;
+    leg_covariance += moved * moved.transpose();
+  }
   const Matrix6d by_legs = legs.by_pose.inverse();
   return (by_legs * leg_covariance * by_legs.transpose()).diagonal().cwiseMax(0.0).cwiseSqrt();
 }

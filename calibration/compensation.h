@@ -41,7 +41,7 @@ struct Target {
                                                        const IdentifyResult* identified = nullptr);
 
 /// Sigma of x .. yaw that an identified machine's pose has at readings for `pose`: uncertainty of the
-/// parameters and the legs' own noise. `pose` in the frames of identified.machine.
+/// parameters, the legs' own noise and a drift. `pose` in the frames of identified.machine.
 [[nodiscard]] Vector6d predicted_sigma(const IdentifyResult& identified, const Pose& pose);
 
 }  // namespace hexcal

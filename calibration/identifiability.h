@@ -35,6 +35,11 @@ struct LegDiagnosis {
   std::string sentence;  ///< "leg 1: scale -6.0 % +- 0.1 %"
 };
 
+/// What to do about a drift (identify.h).
+inline constexpr const char* kDriftInstruction =
+    "let the machine warm up, fasten base and cameras' targets, photograph home again at the end and measure "
+    "once more";
+
 struct Identifiability {
   int free_parameters = 0;
   int rank = 0;          ///< of the whitened Jacobian with columns scaled to length 1

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
 #include <limits>
 
@@ -371,8 +372,51 @@ class Identification {
       result_.influence.push_back(equations_.information_of_pose[i].cwiseProduct(covariance_).sum() /
                                   std::max(1e-300, result_.effective_parameters));
     }
+    result_.drift = find_drift();
     result_.position_sigma_mm = std::sqrt(position);
     result_.orientation_sigma_rad = std::sqrt(orientation);
+  }
+
+  // Score test of six more numbers, motions of B_from_UG in proportion to the order of the poses, at the
+  // solution: what one more Gauss-Newton step would find, with all other parameters free to follow.
+  std::optional<Drift> find_drift() const {
+    constexpr double kByChance = 1e-4;
+    constexpr std::size_t kFewestPoses = 8;
+    const std::size_t n = observations_.poses.size();
+    if (n < kFewestPoses || equations_.rows < result_.effective_parameters + 12) return std::nullopt;
+    std::vector<ReducedPose> extended;
+    ParameterSelection frame_only;
+    frame_only.free_of.assign(static_cast<std::size_t>(result_.layout.size()), -1);
+    frame_only.free_count = 6;
+    for (int k = 0; k < 6; ++k)
+      frame_only.free_of[static_cast<std::size_t>(ParameterLayout::kBaseFrame + k)] = k;
+    for (std::size_t i = 0; i < n; ++i) {
+      const PoseObservation& pose = observations_.poses[i];
+      const LegLinearization legs =
+          linearize_legs(result_.machine, nominal_, result_.layout, result_.stroke_range, filled_[i],
+                         pose.readings, pose.approach);
+      ReducedPose reduced = reduced_[i];
+      const double order = 2 * static_cast<double>(i) / static_cast<double>(n - 1) - 1;
+      const Eigen::Index m = reduced.residuals.size();
+      reduced.jacobian.conservativeResize(Eigen::NoChange, free_count() + 6);
+      reduced.jacobian.rightCols<6>() =
+          order * reduce_to_observed(legs, pose.observed, frame_only).jacobian.topRows(m);
+      extended.push_back(std::move(reduced));
+    }
+    const NormalEquations all = normal_equations(extended, observations_, result_.weights, noise_);
+    const Eigen::MatrixXd across = all.information.topRightCorner(free_count(), 6);
+    const Matrix6d schur =
+        all.information.bottomRightCorner<6, 6>() - across.transpose() * covariance_ * across;
+    const Eigen::LDLT<Matrix6d> ldlt(schur);
+    const Vector6d half = -ldlt.solve(Vector6d(all.gradient.tail<6>()));
+    const double explained = half.dot(schur * half);
+    if (!half.allFinite() || !ldlt.isPositive() || !(explained > 0)) return std::nullopt;
+    // An F test: the noise may have been raised to explain the very drift.
+    const double left = equations_.rows - result_.effective_parameters - 6;
+    const double f = explained / 6 / (std::max(1e-300, all.squares - explained) / left);
+    const boost::math::fisher_f by_chance(6, left);
+    if (f < boost::math::quantile(boost::math::complement(by_chance, kByChance))) return std::nullopt;
+    return Drift{2 * half, f};
   }
 
   const PlatformGeometry& drawing_;
@@ -396,6 +440,13 @@ class Identification {
 };
 
 }  // namespace
+
+std::string Drift::sentence() const {
+  return fmt::format(
+      "the machine moved by {:.2g} mm and {:.2g} deg against the measuring frame from the first pose to "
+      "the last",
+      motion.head<3>().norm(), motion.tail<3>().norm() * kDegPerRad);
+}
 
 IdentifyResult identify(const PlatformGeometry& nominal, const ObservationSet& observations,
                         const IdentifyOptions& options, const IdentifyResult* start) {

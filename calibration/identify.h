@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -47,6 +48,17 @@ struct IdentifyOptions {
 
 enum class IdentifyStatus { failed, identified };
 
+/// A slow common motion of the machine's base against the measuring frame while the poses were measured: a
+/// base that moved, a frame that warmed up. Linear in the order of the poses.
+struct Drift {
+  Vector6d motion =
+      Vector6d::Zero();  ///< of UG in B from the first pose to the last (covariance.h), mm and rad
+  double f = 0;  ///< mean square of what it explains over that of what it leaves (6 numbers; an F test)
+
+  /// "the machine moved by 0.61 mm and 0.02 deg against the measuring frame from the first pose to the last".
+  [[nodiscard]] std::string sentence() const;
+};
+
 struct IdentifyResult {
   IdentifyStatus status = IdentifyStatus::failed;
   std::string reason = "not called";
@@ -69,6 +81,8 @@ struct IdentifyResult {
   double leg_sigma_mm = 0;
   double position_sigma_mm = 0;  ///< noise of the measurement; estimated when it was not known
   double orientation_sigma_rad = 0;
+  /// Where the residuals follow the order of the poses beyond chance (one set in 10,000).
+  std::optional<Drift> drift;
   std::vector<LegVector> leg_residuals_mm;
   std::vector<Vector6d> pose_residuals;  ///< measured minus modelled pose, first order, mm and rad
   std::vector<double> weights;           ///< of the poses, 1 = full
@@ -82,7 +96,8 @@ struct IdentifyResult {
 /// known (of the legs, and without given covariances of positions and angles too) is estimated by restricted
 /// maximum likelihood (Foerstner's iteration), tolerances by evidence
 /// (MacKay, Neural Comput. 4 (1992) 415). With unknown frames the gauge is that of least corrections of the
-/// joints (in units of their tolerance) to nominal. `start`: where the iterations begin, what was identified
+/// joints (in units of their tolerance) to nominal. What the residuals have in common with the order of the
+/// poses is tested (Drift), not modelled. `start`: where the iterations begin, what was identified
 /// with the same nominal machine and options from nearly the same observations; a few iterations are then
 /// enough.
 [[nodiscard]] IdentifyResult identify(const PlatformGeometry& nominal, const ObservationSet& observations,

@@ -188,6 +188,9 @@ void judge_compensation(const CampaignEvidence& evidence, const CrossValidation&
     }
   }
   judge_remainder(calibration, method, noise_mm, verdict);
+  if (calibration.fitted.identified && calibration.fitted.identified->drift) {
+    verdict.findings.emplace_back(calibration.fitted.identified->drift->sentence(), kDriftInstruction);
+  }
   if (!calibration.outliers.empty()) {
     verdict.findings.emplace_back(fmt::format("left out as near singular: {}", listed(calibration.outliers)),
                                   "", Severity::good);

@@ -91,6 +91,10 @@ std::string diagnosis(const CalibrationReport& report) {
   text += fmt::format("noise: {:.4g} mm, {:.4g} deg per measured coordinate, legs {:.4g} mm\n",
                       identified.position_sigma_mm, identified.orientation_sigma_rad * kDegPerRad,
                       identified.leg_sigma_mm);
+  if (identified.drift) {
+    text +=
+        coloured(fmt::format("! {}: {}\n", identified.drift->sentence(), kDriftInstruction), Colour::warning);
+  }
   for (const LegDiagnosis& leg : judged.legs)
     text += fmt::format("{} {}\n", leg.wrong ? "!" : " ", leg.sentence);
   for (const std::string& sentence : judged.beyond_geometry) text += fmt::format("  {}\n", sentence);
@@ -136,6 +140,9 @@ Json identified_json(const CalibrationReport& report) {
            {"leg_sigma_mm", identified.leg_sigma_mm},
            {"advice", judged.advice},
            {"beyond_geometry", judged.beyond_geometry}};
+  if (identified.drift) {
+    out["drift"] = {{"motion_mm_deg", json_mm_deg(identified.drift->motion)}, {"f", identified.drift->f}};
+  }
   for (const char* list : {"parameters", "correlations", "weak", "legs", "poses"}) out[list] = Json::array();
   for (const ParameterReport& p : judged.parameters)
     out["parameters"].push_back({{"name", p.name},

@@ -104,6 +104,7 @@ RecordJson identified_json(const IdentifyResult& identified, const Identifiabili
                  {"condition", number_json(judged.condition)},
                  {"advice", judged.advice},
                  {"beyond_geometry", judged.beyond_geometry}};
+  if (identified.drift) out["drift"] = {vector_json(identified.drift->motion), identified.drift->f};
   for (const char* list : {"parameters", "correlations", "weak", "legs"}) out[list] = RecordJson::array();
   for (const ParameterReport& p : judged.parameters)
     out["parameters"].push_back({p.name, p.unit, p.value, p.sigma, number_json(p.tolerance)});
@@ -122,6 +123,9 @@ void read_identified(const RecordJson& json, CalibrationReport& report) {
   identified.sigma0 = json.at("sigma0").get<double>();
   identified.sigma0_of_measurement = json.at("sigma0_of_measurement").get<double>();
   identified.leg_sigma_mm = json.at("leg_sigma_mm").get<double>();
+  if (json.contains("drift")) {
+    identified.drift = Drift{vector_of(json.at("drift").at(0)), json.at("drift").at(1).get<double>()};
+  }
   Identifiability judged;
   judged.free_parameters = json.at("free_parameters").get<int>();
   judged.rank = json.at("rank").get<int>();
