@@ -204,7 +204,10 @@ std::vector<Pose> planning_candidates(const PlatformGeometry& nominal, std::size
     Pose pose = Pose::from_vector(kShareOfWay * reach * direction);
     for (int shrink = 0; shrink < 8 && tilt_rad(pose) > max_tilt_rad; ++shrink)
       pose = Pose::from_vector(0.8 * pose.vector());
-    if (reach > 0 && tilt_rad(pose) <= max_tilt_rad) poses.push_back(pose);
+    // The workspace need not be a star: what lies on the way is tested once more.
+    if (reach > 0 && tilt_rad(pose) <= max_tilt_rad &&
+        inverse_kinematics(nominal, rest, nominal.B_from_P(pose)).reachable())
+      poses.push_back(pose);
   }
   return poses;
 }

@@ -38,6 +38,8 @@ std::optional<std::string> number_fault(const PlatformGeometry& g) {
     if (limits.base_axes_rad && !((*limits.base_axes_rad)[0] > 0 && (*limits.base_axes_rad)[1] > 0))
       return "the limits about the base joints' axes must be greater than zero";
   }
+  if (g.min_gap_mm && !(std::isfinite(*g.min_gap_mm) && *g.min_gap_mm <= g.gd_mm))
+    return "min_gap_mm must not be greater than gd_mm, the gap at home";
   if (g.leg_radius_mm && !(*g.leg_radius_mm > 0 && std::isfinite(*g.leg_radius_mm)))
     return "the legs' radius must be greater than zero";
   if (g.screw) {

@@ -81,6 +81,13 @@ Clearance leg_clearance(const PlatformGeometry& geometry, const Rigid3& B_from_P
   return nearest;
 }
 
+// Height of the upper grip's plate over O_LG beyond the least one.
+double gap_beyond_least(const PlatformGeometry& geometry, const Rigid3& B_from_P) {
+  if (!geometry.min_gap_mm && geometry.gd_mm <= 0) return kFar;
+  const Eigen::Vector3d in_UG = inverse(geometry.B_from_UG) * (B_from_P * geometry.P_from_LG.translation);
+  return -in_UG.z() - geometry.min_gap_mm.value_or(0);
+}
+
 }  // namespace
 
 const char* name(PoseVerdict verdict) {
@@ -97,6 +104,8 @@ const char* name(PoseVerdict verdict) {
       return "platform_joint";
     case PoseVerdict::legs_collide:
       return "legs_collide";
+    case PoseVerdict::grips_collide:
+      return "grips_collide";
     case PoseVerdict::beyond_singular:
       return "beyond_singular";
     case PoseVerdict::near_singular:
@@ -159,6 +168,7 @@ InverseResult inverse_kinematics(const PlatformGeometry& geometry, const RestSta
   Clearance clearance;
   if (geometry.leg_radius_mm) clearance = leg_clearance(geometry, B_from_P);
   result.clearance_mm = clearance.mm;
+  result.gap_mm = gap_beyond_least(geometry, B_from_P);
   bool same_side = true;
   SingularityBounds bounds;
   const bool own_length = options.near.characteristic_length_mm > 0;
@@ -189,6 +199,8 @@ InverseResult inverse_kinematics(const PlatformGeometry& geometry, const RestSta
   } else if (clearance.mm < 0) {
     broken(PoseVerdict::legs_collide, clearance.leg);
     result.other_leg = clearance.other_leg;
+  } else if (result.gap_mm < 0) {
+    broken(PoseVerdict::grips_collide, -1);
   } else if (!same_side) {
     broken(PoseVerdict::beyond_singular, -1);
   } else if (result.singularity && result.singularity->near_singular) {
@@ -220,6 +232,8 @@ std::string reason(const InverseResult& result) {
     case PoseVerdict::legs_collide:
       return fmt::format("legs {} and {} would overlap by {:.3f} mm", leg, result.other_leg + 1,
                          -result.clearance_mm);
+    case PoseVerdict::grips_collide:
+      return fmt::format("the grips would be {:.3f} mm nearer than they may", -result.gap_mm);
     case PoseVerdict::beyond_singular:
       return "the pose lies beyond a singularity";
     case PoseVerdict::near_singular:

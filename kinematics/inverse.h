@@ -17,6 +17,7 @@ enum class PoseVerdict {
   base_joint,  ///< a base joint would turn beyond its cone or an axis
   platform_joint,
   legs_collide,     ///< two legs are nearer than twice their radius
+  grips_collide,    ///< the grips are nearer than their least gap
   beyond_singular,  ///< on the other side of a singularity than home
   near_singular,    ///< can be held only badly
   not_a_pose,       ///< not finite
@@ -55,6 +56,7 @@ struct InverseResult {
       Eigen::Matrix<double, 6, 2>::Zero();  ///< turns about the U joint's first and second axis
   double joint_margin_rad = 0;              ///< smallest over all joints; infinite without limits
   double clearance_mm = 0;  ///< between the surfaces of the nearest legs; infinite without a leg radius
+  double gap_mm = 0;        ///< between the grips beyond their least gap; infinite where none is known
   std::optional<SingularityMeasures> singularity;
 
   [[nodiscard]] bool reachable() const { return verdict == PoseVerdict::reachable; }

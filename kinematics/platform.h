@@ -47,6 +47,9 @@ struct PlatformGeometry {
   std::optional<JointLimits> joint_limits;
   std::optional<double> leg_radius_mm = std::nullopt;  ///< legs are capsules of this radius
   std::optional<ScrewLead> screw = std::nullopt;
+  /// Least height of O_UG over O_LG along UG's z. Without it the grips may come together but not pass each
+  /// other; where they already do at home (gd_mm = 0), nothing is known of them.
+  std::optional<double> min_gap_mm = std::nullopt;
 
   /// B_from_P = B_from_UG * UG_from_LG * LG_from_P.
   [[nodiscard]] Rigid3 B_from_P(const Pose& pose) const;

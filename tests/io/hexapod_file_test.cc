@@ -29,6 +29,7 @@ TEST(HexapodFile, ReadsWhatItWrites) {
   PlatformGeometry g = surrogate_hexapod();
   g.actuators[3] = {12.25, 0.075, 381, 579.5};
   g.leg_radius_mm = 14;
+  g.min_gap_mm = -3.5;
   g.joint_limits->base_axes_rad = {0.5, 0.25};
   g.screw = ScrewLead{5, {}, {}};
   g.screw->base_axes.fill(Eigen::Vector3d::UnitY());
@@ -47,6 +48,7 @@ TEST(HexapodFile, ReadsWhatItWrites) {
   EXPECT_THAT(back.P_from_LG, RigidNear(g.P_from_LG, 1e-13, 1e-12));
   EXPECT_EQ(back.gd_mm, 50);
   EXPECT_EQ(back.leg_radius_mm, g.leg_radius_mm);
+  EXPECT_EQ(back.min_gap_mm, g.min_gap_mm);
   EXPECT_EQ(back.screw->lead_mm, 5);
   EXPECT_NEAR(back.joint_limits->base_rad, 45 * kRadPerDeg, 1e-15);
   EXPECT_NEAR((*back.joint_limits->base_axes_rad)[1], 0.25, 1e-15);

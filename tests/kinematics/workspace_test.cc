@@ -85,6 +85,7 @@ TEST(GeometryFault, NamesWhatNoMachineCanHave) {
               HasSubstr("B_from_UG or P_from_LG is not finite"));
   EXPECT_THAT(fault([](G& g) { g.gd_mm = kNan; }), HasSubstr("gd_mm"));
   EXPECT_THAT(fault([](G& g) { g.leg_radius_mm = -1; }), HasSubstr("radius"));
+  EXPECT_THAT(fault([](G& g) { g.min_gap_mm = g.gd_mm + 1; }), HasSubstr("min_gap_mm"));
   EXPECT_THAT(fault([](G& g) { g.joint_limits->base_rad = 0; }), HasSubstr("base joints' limit"));
   EXPECT_THAT(fault([](G& g) { g.joint_limits->platform_rad = 0; }), HasSubstr("platform joints' limit"));
   EXPECT_THAT(fault([](G& g) {

@@ -30,6 +30,8 @@ const char* colour(PoseVerdict verdict) {
       return "#e69138";
     case PoseVerdict::legs_collide:
       return "#8e7cc3";
+    case PoseVerdict::grips_collide:
+      return "#bf9000";
     case PoseVerdict::beyond_singular:
       return "#660000";
     case PoseVerdict::near_singular:
@@ -40,10 +42,10 @@ const char* colour(PoseVerdict verdict) {
   return "#000000";
 }
 
-constexpr std::array kAll{PoseVerdict::reachable,       PoseVerdict::too_short,
-                          PoseVerdict::too_long,        PoseVerdict::base_joint,
-                          PoseVerdict::platform_joint,  PoseVerdict::legs_collide,
-                          PoseVerdict::beyond_singular, PoseVerdict::near_singular};
+constexpr std::array kAll{
+    PoseVerdict::reachable,     PoseVerdict::too_short,       PoseVerdict::too_long,
+    PoseVerdict::base_joint,    PoseVerdict::platform_joint,  PoseVerdict::legs_collide,
+    PoseVerdict::grips_collide, PoseVerdict::beyond_singular, PoseVerdict::near_singular};
 
 double shown(int axis, double value) { return axis < 3 ? value : value * kDegPerRad; }
 

@@ -87,6 +87,7 @@ PlatformGeometry hexapod_from_yaml(const YamlMap& map) {
   geometry.P_from_LG = map.rigid3("P_from_LG");
   const YamlMap home = map.map("home");
   geometry.gd_mm = home.number("gd_mm");
+  if (home.has("min_gap_mm")) geometry.min_gap_mm = home.number("min_gap_mm");
   home.finish();
   geometry.actuators = read_actuators(map.map("actuators"));
   if (map.has("joint_limits")) geometry.joint_limits = read_joint_limits(map.map("joint_limits"));
@@ -111,7 +112,9 @@ std::string hexapod_text(const std::string& head, const PlatformGeometry& geomet
   text += triples("platform_joints_mm", geometry.platform_joints_mm);
   text += motion("B_from_UG", geometry.B_from_UG);
   text += motion("P_from_LG", geometry.P_from_LG);
-  text += fmt::format("home: {{gd_mm: {}}}\n", geometry.gd_mm);
+  text += fmt::format("home: {{gd_mm: {}", geometry.gd_mm);
+  if (geometry.min_gap_mm) text += fmt::format(", min_gap_mm: {}", *geometry.min_gap_mm);
+  text += "}\n";
   const auto& actuators = geometry.actuators;
   text += fmt::format("actuators: {{min_mm: {}, max_mm: {}, offset_mm: {}, mm_per_unit: {}}}\n",
                       six_numbers(actuators, &Actuator::min_mm), six_numbers(actuators, &Actuator::max_mm),
