@@ -109,11 +109,16 @@ class Victim:
         """Starts the command and kills it; whether it lived so long, and what is wrong with the rest."""
         self.restore()
         run = subprocess.Popen(self.typed(self.command), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        # Every third near the end, where the files are written.
-        time.sleep(self.rng.uniform(0.8, 1.05) * self.took if i % 3 == 0 else self.rng.uniform(0, self.took))
-        killed = run.poll() is None
+        start = time.monotonic()
+        try:
+            # Every third near the end, where the files are written.
+            run.wait(self.rng.uniform(0.8, 1.05) * self.took if i % 3 == 0 else self.rng.uniform(0, self.took))
+            killed = False
+            self.took = time.monotonic() - start  # others have left the machine
+        except subprocess.TimeoutExpired:
+            killed = True
         number = getattr(signal, "SIG" + self.args.signal)
-        run.send_signal(number)
+        run.send_signal(number)  # nothing if it has ended
         code = run.wait(timeout=60)
         problems = [f"it ended with {code}"] if code not in (0, 1, -number) else []
         for name, data in files_of(self.lab).items():

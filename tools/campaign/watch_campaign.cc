@@ -46,7 +46,7 @@ class Watcher {
   Watcher(const WatchRequest& request, const std::atomic<bool>& stop, WatchObserver& observer)
       : request_(request), stop_(stop), observer_(observer) {}
 
-  void run() {
+  bool run() {
     const OpenCampaign first = reopen();
     const CampaignLock lock(first.results);
     resume(first);
@@ -58,11 +58,13 @@ class Watcher {
     while (!stop_) {
       try {
         if (look()) last_change = Clock::now();
+        failing_ = false;
       } catch (const UnsuitedCamera&) {
         throw;
       } catch (const InputError& error) {
         // A folder that is away for a while, a file in the middle of being edited, a full disk: said once,
         // and tried again.
+        failing_ = true;
         say_once(error.what());
       }
       const std::chrono::duration<double> quiet = Clock::now() - last_change;
@@ -70,6 +72,7 @@ class Watcher {
       watch.wait(due_ ? 0 : waiting_ ? kBusyPollMs : kPollMs);
     }
     for (const auto& [pose, count] : incomplete_) observer_.incomplete(pose, count);
+    return !failing_;
   }
 
  private:
@@ -84,7 +87,8 @@ class Watcher {
   void resume(const OpenCampaign& open) {
     if (!fs::exists(open.poses_csv)) return;
     try {
-      for (const PoseRecord& record : read_pose_table(open.poses_csv)) complete_.insert(record.id);
+      for (const PoseRecord& record : read_pose_table(open.poses_csv, ReadFor::own_result))
+        complete_.insert(record.id);
     } catch (const InputError&) {
       // Not a table of ours; it will be written anew.
     }
@@ -249,13 +253,14 @@ class Watcher {
   Clock::time_point pending_since_;
   std::string said_;
   bool waiting_ = false;  // for something that will happen soon
+  bool failing_ = false;  // the last look met a fault in the files
   bool due_ = false;      // a photograph can be looked at now
 };
 
 }  // namespace
 
-void watch_campaign(const WatchRequest& request, const std::atomic<bool>& stop, WatchObserver& observer) {
-  Watcher(request, stop, observer).run();
+bool watch_campaign(const WatchRequest& request, const std::atomic<bool>& stop, WatchObserver& observer) {
+  return Watcher(request, stop, observer).run();
 }
 
 }  // namespace hexcal

@@ -29,7 +29,9 @@ class WatchObserver {
 
 /// Measures the poses of a campaign as their photographs arrive and writes its results after each complete
 /// pose, until `stop` is set or nothing arrives for long. A file counts when its size rests and it decodes;
-/// what was measured before stays. Throws UnsuitedCamera; other faults of the files are said and tried again.
-void watch_campaign(const WatchRequest& request, const std::atomic<bool>& stop, WatchObserver& observer);
+/// what was measured before stays. Throws UnsuitedCamera; other faults of the files are said and tried again;
+/// false if one stood in the way to the end.
+[[nodiscard]] bool watch_campaign(const WatchRequest& request, const std::atomic<bool>& stop,
+                                  WatchObserver& observer);
 
 }  // namespace hexcal

@@ -72,8 +72,7 @@ int watch(const WatchRequest& request) {
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
   WatchLines lines(request.expect);
-  watch_campaign(request, stop_requested, lines);
-  return kDone;
+  return watch_campaign(request, stop_requested, lines) ? kDone : kSomeFailed;
 }
 
 }  // namespace

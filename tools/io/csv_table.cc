@@ -102,7 +102,9 @@ CsvTable CsvTable::parse(std::string_view text, const std::filesystem::path& pat
   return table;
 }
 
-CsvTable CsvTable::read(const std::filesystem::path& path) { return parse(read_file(path), path); }
+CsvTable CsvTable::read(const std::filesystem::path& path, ReadFor purpose) {
+  return parse(read_file(path, purpose), path);
+}
 
 bool CsvTable::has_column(std::string_view name) const {
   return std::find(columns_.begin(), columns_.end(), name) != columns_.end();

@@ -6,13 +6,15 @@
 #include <string_view>
 #include <vector>
 
+#include "photogrammetry/photograph/input_file.h"
+
 namespace hexcal {
 
 /// A CSV table with named columns. Lines that begin with '#' are comments; fields may be quoted; CRLF, a byte
 /// order mark and blank lines are accepted. All errors are InputError and name file, line and column.
 class CsvTable {
  public:
-  [[nodiscard]] static CsvTable read(const std::filesystem::path& path);
+  [[nodiscard]] static CsvTable read(const std::filesystem::path& path, ReadFor purpose = ReadFor::input);
   [[nodiscard]] static CsvTable parse(std::string_view text, const std::filesystem::path& path);
 
   [[nodiscard]] std::size_t rows() const { return rows_.size(); }

@@ -35,8 +35,8 @@ std::optional<Vector6d> read_six(const CsvTable& table, std::size_t row,
 
 bool is_suspect(const std::string& status) { return status == "suspect" || status.starts_with("suspect:"); }
 
-std::vector<PoseRecord> read_pose_table(const std::filesystem::path& path) {
-  const CsvTable table = CsvTable::read(path);
+std::vector<PoseRecord> read_pose_table(const std::filesystem::path& path, ReadFor purpose) {
+  const CsvTable table = CsvTable::read(path, purpose);
   std::vector<std::string> required{"pose"};
   required.insert(required.end(), kPoseColumns.begin(), kPoseColumns.end());
   table.require_columns(required);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "kinematics/geometry/pose.h"
+#include "photogrammetry/photograph/input_file.h"
 
 namespace hexcal {
 
@@ -45,7 +46,8 @@ struct PoseRecord {
 
 /// Reads a pose table (columns pose,x_mm,...,yaw_deg and optional others). Duplicate ids are an error. A row
 /// whose status is neither "ok" nor "suspect" may leave its numbers empty; any other row must have all six.
-[[nodiscard]] std::vector<PoseRecord> read_pose_table(const std::filesystem::path& path);
+[[nodiscard]] std::vector<PoseRecord> read_pose_table(const std::filesystem::path& path,
+                                                      ReadFor purpose = ReadFor::input);
 
 enum class PoseColumns {
   target,     ///< pose,x_mm,...,yaw_deg
