@@ -56,14 +56,34 @@ bool points_left(const std::vector<cv::Point2f>& corners, int columns) {
   return std::abs(along.x) >= std::abs(along.y) ? along.x < 0 : along.y < 0;
 }
 
+double search_scale(const cv::Mat& grey) {
+  return std::min(1.0, static_cast<double>(kSearchSide) / std::max(grey.cols, grey.rows));
+}
+
+cv::Mat search_image(const cv::Mat& grey) {
+  cv::Mat image = eight_bit(grey);
+  const double scale = search_scale(grey);
+  if (scale < 1) cv::resize(image, image, {}, scale, scale, cv::INTER_AREA);
+  return image;
+}
+
 }  // namespace
+
+std::optional<std::pair<int, int>> chessboard_size(const cv::Mat& grey) {
+  constexpr int kFewestCorners = 3;
+  std::vector<cv::Point2f> found;
+  cv::Mat board;  // a cell per corner
+  if (!cv::findChessboardCornersSB(search_image(grey), {kFewestCorners, kFewestCorners}, found,
+                                   cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_LARGER, board))
+    return std::nullopt;
+  return std::pair(std::max(board.cols, board.rows) + 1, std::min(board.cols, board.rows) + 1);
+}
 
 std::vector<Eigen::Vector2d> find_chessboard(const cv::Mat& grey, const Sheet& sheet) {
   const int columns = sheet.columns - 1;
   const int rows = sheet.rows - 1;
-  cv::Mat image = eight_bit(grey);
-  const double scale = std::min(1.0, static_cast<double>(kSearchSide) / std::max(image.cols, image.rows));
-  if (scale < 1) cv::resize(image, image, {}, scale, scale, cv::INTER_AREA);
+  const cv::Mat image = search_image(grey);
+  const double scale = search_scale(grey);
   std::vector<cv::Point2f> corners = search(image, {columns, rows});
   if (corners.empty()) return {};
   // The finder may follow the rows from the right: undo a mirrored order first.

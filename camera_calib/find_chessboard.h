@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "camera_calib/sheet.h"
@@ -13,5 +15,9 @@ namespace hexcal {
 /// board that looks the same after half a turn is taken with its x axis to the right (or downwards if it
 /// stands on end).
 [[nodiscard]] std::vector<Eigen::Vector2d> find_chessboard(const cv::Mat& grey, const Sheet& sheet);
+
+/// Squares of the whole chessboard in a photograph, the larger number first, whatever its size; nothing where
+/// there is none.
+[[nodiscard]] std::optional<std::pair<int, int>> chessboard_size(const cv::Mat& grey);
 
 }  // namespace hexcal

@@ -10,6 +10,7 @@
 
 #include "camera_calib/bent_markers.h"
 #include "camera_calib/detect_sheets.h"
+#include "camera_calib/find_chessboard.h"
 #include "camera_calib/robust_fit.h"
 #include "camera_calib/sheet_slip.h"
 
@@ -153,6 +154,46 @@ void measure_markers(const std::vector<Sheet>& sheets, const Pixels& pixels, Cal
   }
 }
 
+// Where a chessboard is found in few photographs: whether another one, a usual slip away from the
+// description, is in them. A handful of photographs tells.
+std::optional<std::string> chessboard_slip(const std::vector<Sheet>& sheets,
+                                           const std::vector<SheetPhotograph>& photographs,
+                                           const Pixels& pixels) {
+  constexpr std::size_t kLooked = 6;
+  if (sheets.size() != 1 || sheets[0].kind != SheetKind::chessboard) return std::nullopt;
+  std::vector<std::size_t> without;
+  std::size_t readable = 0;
+  for (std::size_t i = 0; i < photographs.size(); ++i) {
+    if (photographs[i].status != PhotographStatus::ok) continue;
+    ++readable;
+    if (photographs[i].features.empty()) without.push_back(i);
+  }
+  if (without.empty() || 4 * (readable - without.size()) > readable) return std::nullopt;
+  const std::size_t stride = (without.size() + kLooked - 1) / kLooked;
+  std::vector<std::size_t> looked;
+  for (std::size_t i = 0; i < without.size(); i += stride) looked.push_back(without[i]);
+  std::vector<std::optional<std::pair<int, int>>> found(looked.size());
+  tbb::parallel_for(std::size_t{0}, looked.size(),
+                    [&](std::size_t i) { found[i] = chessboard_size(pixels.get(looked[i]).grey); });
+  std::map<std::pair<int, int>, int> counts;
+  for (const auto& one : found)
+    if (one) ++counts[*one];
+  if (counts.empty()) return std::nullopt;
+  std::pair<int, int> size = most_frequent(counts);
+  const int most_seen = counts[size];
+  if (2 * most_seen < static_cast<int>(looked.size())) return std::nullopt;
+  const std::pair<int, int> given(sheets[0].columns, sheets[0].rows);
+  if (given.first < given.second) std::swap(size.first, size.second);
+  if (size == given) return std::nullopt;
+  const bool corners = size == std::pair(given.first + 1, given.second + 1);
+  return fmt::format(
+      "the sheet's description says columns: {}, rows: {}, the photographs show columns: {}, rows: {} ({} of "
+      "{} "
+      "looked at){}",
+      given.first, given.second, size.first, size.second, most_seen, looked.size(),
+      corners ? ": columns and rows count squares, not the corners between them" : "");
+}
+
 LensSetting common_setting(const std::vector<SheetPhotograph>& photographs,
                            const CameraCalibration& calibration) {
   for (const SheetView& view : calibration.fit.adjustment.state.views) {
@@ -178,6 +219,11 @@ MeasuredCamera measure_camera(const std::vector<fs::path>& paths, const std::vec
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     const auto slip = sheet_slip(sheets, s, out.photographs);
     if (!slip) continue;
+    out.calibration.status = CalibrationStatus::other_sheet;
+    out.calibration.reason = *slip;
+    return out;
+  }
+  if (const auto slip = chessboard_slip(sheets, out.photographs, pixels)) {
     out.calibration.status = CalibrationStatus::other_sheet;
     out.calibration.reason = *slip;
     return out;

@@ -7,6 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "camera_calib/detect_sheets.h"
+#include "camera_calib/find_chessboard.h"
 #include "kinematics/geometry/pose.h"
 #include "tests/support/sheet_photographs.h"
 #include "tests/support/temporary_folder.h"
@@ -100,6 +101,17 @@ void expect_nothing_found(const Sheet& sheet, const cv::Mat& grey, const std::st
   EXPECT_TRUE(std::none_of(detection.features.begin(), detection.features.end(),
                            [](const FeatureObservation& f) { return f.status == MarkerStatus::ok; }));
   EXPECT_EQ(detection.reason, words);
+}
+
+// For descriptions that count corners instead of squares, or are off by one.
+TEST(DetectSheets, TheSizeOfAnyChessboardIsTold) {
+  const Sheet printed = sheet_of(SheetKind::chessboard);
+  const CameraModel camera(720, 540, 780);
+  for (const int view : {0, 1, 2}) {
+    const cv::Mat grey = sheet_photograph(printed, camera, whole_sheet_view(printed, camera, view), {}, 3);
+    EXPECT_EQ(chessboard_size(grey), std::pair(printed.columns, printed.rows)) << view;
+  }
+  EXPECT_FALSE(chessboard_size(cv::Mat(540, 720, CV_8UC1, cv::Scalar(180))));
 }
 
 TEST(DetectSheets, SaysWhatIsNotThere) {
