@@ -241,7 +241,13 @@ class Advisor {
 
   void uncertainty() {
     const CameraQuality& quality = report_.quality;
-    if (quality.uncertainty_corner_px > kGoodCorner) {
+    if (const int none = report_.uncertainty.unknown(); none > 0) {
+      add(AdviceLevel::retake,
+          fmt::format("in {:.0f} % of the frame the lens is not known at all, as no point of the sheet came "
+                      "near: more "
+                      "photographs with the sheet there",
+                      100.0 * none / static_cast<double>(report_.uncertainty.px.size())));
+    } else if (quality.uncertainty_corner_px > kGoodCorner) {
       add(quality.uncertainty_corner_px > kUsableCorner ? AdviceLevel::retake : AdviceLevel::usable,
           fmt::format(
               "projection is uncertain by {:.2f} px in a corner of the frame ({:.3f} px in its centre): more "

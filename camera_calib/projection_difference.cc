@@ -77,8 +77,13 @@ double ProjectionUncertainty::sigma_px(std::size_t i) const {
 
 double ProjectionUncertainty::mean_variance_px2() const {
   double sum = 0;
-  for (const Eigen::Matrix2d& covariance : covariance_px2) sum += covariance.trace();
-  return sum / static_cast<double>(covariance_px2.size());
+  for (std::size_t i = 0; i < covariance_px2.size(); ++i)
+    if (known[i]) sum += covariance_px2[i].trace();
+  return sum / std::max(1.0, static_cast<double>(px.size()) - unknown());
+}
+
+int ProjectionUncertainty::unknown() const {
+  return static_cast<int>(std::count(known.begin(), known.end(), false));
 }
 
 ProjectionUncertainty projection_uncertainty(const CameraModel& camera, const Eigen::MatrixXd& covariance,
@@ -87,6 +92,7 @@ ProjectionUncertainty projection_uncertainty(const CameraModel& camera, const Ei
   out.columns = columns;
   out.rows = rows;
   out.px = frame_grid(camera, columns, rows);
+  const double diagonal2 = std::pow(camera.width_px, 2) + std::pow(camera.height_px, 2);
   const Eigen::Index n = camera.parameters.size();
   std::vector<Eigen::MatrixXd> by_parameters;
   std::vector<Eigen::Matrix<double, 2, 3>> by_turn;
@@ -96,7 +102,9 @@ ProjectionUncertainty projection_uncertainty(const CameraModel& camera, const Ei
     Eigen::Matrix2d by_point = Eigen::Matrix2d::Identity();
     CameraModel::ByParameters j = CameraModel::ByParameters::Zero(2, n);
     Eigen::Matrix<double, 2, 3> turn = Eigen::Matrix<double, 2, 3>::Zero();
-    if (const auto normalised = camera.normalised_from_image(px)) {
+    const auto normalised = camera.normalised_from_image(px);
+    out.known.push_back(normalised.has_value());
+    if (normalised) {
       (void)camera.image_from_normalised(*normalised, &by_point, &j);
       turn = by_rotation(by_point, normalised->homogeneous());
       normal += turn.transpose() * turn;
@@ -108,7 +116,10 @@ ProjectionUncertainty projection_uncertainty(const CameraModel& camera, const Ei
   const Eigen::MatrixXd rotation_by_parameters = normal.ldlt().solve(right);
   for (std::size_t i = 0; i < out.px.size(); ++i) {
     const Eigen::MatrixXd j = by_parameters[i] - by_turn[i] * rotation_by_parameters;
-    out.covariance_px2.emplace_back(j * covariance * j.transpose());
+    // A lens that folds back before it reaches a pixel says nothing of it: as uncertain as the frame is
+    // large.
+    out.covariance_px2.emplace_back(out.known[i] ? Eigen::Matrix2d(j * covariance * j.transpose())
+                                                 : Eigen::Matrix2d(diagonal2 * Eigen::Matrix2d::Identity()));
   }
   return out;
 }

@@ -31,9 +31,13 @@ struct ProjectionUncertainty {
   int rows = 0;
   std::vector<Eigen::Vector2d> px;
   std::vector<Eigen::Matrix2d> covariance_px2;
+  /// Where false, the lens model leads to the pixel from no direction (it folds back before): as uncertain as
+  /// the frame is large.
+  std::vector<bool> known;
 
   [[nodiscard]] double sigma_px(std::size_t i) const;
-  /// Mean over the frame of the variance of both coordinates together.
+  [[nodiscard]] int unknown() const;
+  /// Mean over the known part of the frame of the variance of both coordinates together.
   [[nodiscard]] double mean_variance_px2() const;
 };
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <map>
 #include <set>
 
@@ -16,6 +17,7 @@ constexpr double kHolds = 0.95;  // share of the markers at which a description 
 constexpr double kNamed = 0.85;  // that a slip has to explain
 constexpr double kClearlyMore = 0.05;
 constexpr std::size_t kLeastMarkers = 8;
+constexpr int kMostColumns = 40;
 constexpr int kFarthestShift = 3;  // of first_id, columns and rows
 
 // A description and how its markers stand in their places: turned by so many quarter turns.
@@ -90,21 +92,32 @@ bool possible(const Sheet& sheet) {
   return true;
 }
 
-// The least id that was read in at least two photographs: a false read seldom comes twice.
-std::optional<int> least_id_of(const Reads& reads) {
+// The least and the greatest id that were read in at least two photographs: a false read seldom comes twice.
+std::optional<std::pair<int, int>> ids_of(const Reads& reads) {
   std::map<int, int> photographs;
   for (const auto& photograph : reads) {
     std::set<int> ids;
     for (const MarkerRead& read : photograph) ids.insert(read.id);
     for (const int id : ids) ++photographs[id];
   }
+  std::optional<std::pair<int, int>> range;
   for (const auto& [id, n] : photographs) {
-    if (n >= 2) return id;
+    if (n >= 2) range = std::pair(range ? range->first : id, id);
   }
-  return std::nullopt;
+  return range;
 }
 
-std::vector<Candidate> slips_of(const Sheet& given, std::optional<int> least_id) {
+// The fewest rows with which a sheet has a marker of this id.
+int rows_for(Sheet sheet, int id) {
+  for (sheet.rows = 1; sheet.rows < kMostColumns; ++sheet.rows) {
+    if (!possible(sheet)) continue;
+    const std::vector<SheetMarker> markers = sheet_geometry(sheet).markers;
+    if (std::ranges::any_of(markers, [id](const SheetMarker& marker) { return marker.id >= id; })) break;
+  }
+  return sheet.rows;
+}
+
+std::vector<Candidate> slips_of(const Sheet& given, std::optional<std::pair<int, int>> ids) {
   std::vector<Candidate> out;
   const auto add = [&out, &given](const Sheet& sheet, std::string words, int quarter_turns = 0) {
     if (possible(sheet)) out.push_back({sheet, quarter_turns, std::move(words)});
@@ -133,10 +146,16 @@ std::vector<Candidate> slips_of(const Sheet& given, std::optional<int> least_id)
       add(sheet, fmt::format("first_id: {}", sheet.first_id));
     }
   }
-  if (least_id && given.kind != SheetKind::markers && *least_id != given.first_id) {
+  if (ids && given.kind != SheetKind::markers && ids->first != given.first_id) {
     Sheet sheet = given;
-    sheet.first_id = *least_id;
-    add(sheet, fmt::format("first_id: {}", *least_id));
+    sheet.first_id = ids->first;
+    add(sheet, fmt::format("first_id: {}", ids->first));
+  }
+  // Quite another sheet of this kind.
+  for (int columns = 2; ids && columns < kMostColumns && given.kind != SheetKind::markers; ++columns) {
+    Sheet sheet = given;
+    sheet.columns = columns;
+    sized(columns, rows_for(sheet, ids->second));
   }
   for (const int turns : {2, 1, 3}) {
     add(given,
@@ -170,11 +189,16 @@ std::optional<std::string> sheet_slip(const std::vector<Sheet>& sheets, std::siz
   if (share(as_given) >= kHolds) return std::nullopt;
   std::optional<Candidate> best;
   std::size_t most = as_given;
-  for (const Candidate& candidate : slips_of(given, least_id_of(reads))) {
+  const auto ids = ids_of(reads);
+  int fewest_beyond = 0;
+  for (const Candidate& candidate : slips_of(given, ids)) {
     const std::size_t n = agreeing(candidate, reads);
-    if (n <= most) continue;
+    // Rows beyond the last marker that was seen explain nothing.
+    const int beyond = ids ? std::abs(sheet_geometry(candidate.sheet).markers.back().id - ids->second) : 0;
+    if (n < most || n == as_given || (n == most && beyond >= fewest_beyond)) continue;
     most = n;
     best = candidate;
+    fewest_beyond = beyond;
   }
   if (!best || share(most) < kNamed || share(most) < share(as_given) + kClearlyMore) return std::nullopt;
   return fmt::format(

@@ -75,6 +75,17 @@ TEST(SheetSlip, ColumnsAndRowsExchangedOrOffByOneAreNamed) {
   EXPECT_THAT(named(other, board_9x6()), ::testing::HasSubstr("the photographs show columns: 9, rows: 6"));
 }
 
+TEST(SheetSlip, QuiteAnotherSheetIsNamed) {
+  Sheet other = board_9x6();
+  other.columns = 5;
+  other.rows = 11;
+  EXPECT_THAT(named(other, board_9x6()), ::testing::HasSubstr("the photographs show columns: 9, rows: 6"));
+  other = grid_8x6();
+  other.columns = 14;
+  other.rows = 9;
+  EXPECT_THAT(named(other, grid_8x6()), ::testing::HasSubstr("the photographs show columns: 8, rows: 6"));
+}
+
 TEST(SheetSlip, FirstIdIsNamed) {
   for (const int off : {-20, -1, 1, 2, 100}) {
     Sheet other = grid_8x6();
