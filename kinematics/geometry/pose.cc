@@ -22,6 +22,11 @@ Eigen::Vector3d rpy_from_quaternion(const Eigen::Quaterniond& q) {
 
 double wrap_angle(double angle_rad) { return std::remainder(angle_rad, 360.0 * kRadPerDeg); }
 
+Pose wrapped(Pose pose) {
+  for (double& angle : pose.rpy_rad) angle = wrap_angle(angle);
+  return pose;
+}
+
 Rigid3 home_from_lg(const Pose& pose) { return {quaternion_from_rpy(pose.rpy_rad), pose.position_mm}; }
 
 double tilt_rad(const Pose& pose) {

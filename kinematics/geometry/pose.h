@@ -37,6 +37,9 @@ struct Pose {
   [[nodiscard]] static Pose from_vector(const Vector6d& v) { return {v.head<3>(), v.tail<3>()}; }
 };
 
+/// The same pose with each angle in (-pi, pi].
+[[nodiscard]] Pose wrapped(Pose pose);
+
 /// home_from_LG = Trans(x, y, z) * R, the pose as a rigid motion.
 [[nodiscard]] Rigid3 home_from_lg(const Pose& pose);
 [[nodiscard]] Pose pose_from_home_from_lg(const Rigid3& home_from_LG);

@@ -1,7 +1,10 @@
 #include <gmock/gmock.h>
 
+#include <array>
 #include <fstream>
+#include <sstream>
 
+#include "kinematics/dh_chain.h"
 #include "tests/support/hexapods.h"
 #include "tests/support/run_hexcal.h"
 #include "tests/support/temporary_folder.h"
@@ -40,6 +43,49 @@ TEST(LegsAndPose, UndoEachOther) {
     EXPECT_LE(pose_error(*back[i].pose, *there[i].pose).norm(), 1e-8);
   }
   EXPECT_THAT(contents(lab.file("back.csv")), HasSubstr(",unique,1"));
+}
+
+// The paper's options 1 and 2 work with these; any of the six legs tells the whole pose.
+TEST(LegsAndPose, DenavitHartenbergVariablesTellThePose) {
+  const Lab lab;
+  const CommandResult result = run_hexcal({"legs", "--hexapod", lab.file("h.yaml"), "--dh", "--poses",
+                                           lab.file("poses.csv"), "-o", lab.file("dh.csv")});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const PlatformGeometry geometry = surrogate_hexapod();
+  const std::array<LegChain, 6> chains = leg_chains(geometry);
+  const std::vector<PoseRecord> poses = read_pose_table(lab.file("poses.csv"));
+  std::istringstream lines(contents(lab.file("dh.csv")));
+  std::string line;
+  std::getline(lines, line);
+  std::getline(lines, line);
+  EXPECT_EQ(line, "pose,leg,theta1_deg,theta2_deg,d3_mm,theta4_deg,theta5_deg,theta6_deg");
+  for (const PoseRecord& pose : poses) {
+    for (std::size_t leg = 0; leg < 6; ++leg) {
+      ASSERT_TRUE(std::getline(lines, line));
+      Vector6d dh;
+      std::istringstream cells(line.substr(line.rfind(',' + std::to_string(leg + 1) + ',') + 3));
+      for (double& value : dh) {
+        cells >> value;
+        cells.ignore();
+      }
+      for (const Eigen::Index angle : {0, 1, 3, 4, 5}) dh[angle] *= kRadPerDeg;
+      const Pose back = geometry.pose_from_B_from_P(pose_along_leg(chains[leg], dh));
+      EXPECT_LT(pose_error(back, *pose.pose).norm(), 1e-6) << line;
+    }
+  }
+  const CommandResult one =
+      run_hexcal({"legs", "--hexapod", lab.file("h.yaml"), "--dh", "--pose", "0,0,0,0,0,0"});
+  EXPECT_EQ(one.exit_code, 0);
+  EXPECT_THAT(one.out, HasSubstr("theta4_deg"));
+}
+
+// 350 degrees are -10.
+TEST(LegsAndPose, AnglesBeyondHalfATurnAreWrapped) {
+  const Lab lab;
+  std::ofstream(lab.file("turned.csv"))
+      << "pose,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\na,1,2,3,350,-725,370\n";
+  const Vector6d deg = mm_deg(read_pose_table(lab.file("turned.csv")).front().pose->vector());
+  EXPECT_LT((deg - (Vector6d() << 1, 2, 3, -10, -5, 10).finished()).norm(), 1e-9);
 }
 
 TEST(LegsAndPose, BytesDoNotDependOnTheThreads) {

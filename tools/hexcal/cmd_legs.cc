@@ -3,10 +3,12 @@
 #include <cstdio>
 #include <memory>
 
+#include "kinematics/dh_chain.h"
 #include "kinematics/geometry/input_error.h"
 #include "kinematics/inverse.h"
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/machine_flags.h"
+#include "tools/hexcal/terminal.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/csv_table.h"
 #include "tools/io/pose_table.h"
@@ -21,6 +23,7 @@ struct LegsFlags {
   std::filesystem::path poses;
   std::filesystem::path out = "legs.csv";
   std::string pose;
+  bool dh = false;
 };
 
 struct LegsAnswer {
@@ -42,10 +45,51 @@ LegsAnswer solve(const Machine& machine, const Pose& pose) {
   return answer;
 }
 
+// Denavit-Hartenberg variables in mm and deg.
+Vector6d in_degrees(Vector6d dh) {
+  for (const Eigen::Index angle : {0, 1, 3, 4, 5}) dh[angle] *= kDegPerRad;
+  return dh;
+}
+
+int print_dh(const Machine& machine, const Pose& pose) {
+  const Matrix6d table = dh_table(machine.rest.chains, machine.geometry.B_from_P(pose));
+  TextTable text({"leg", "theta1_deg", "theta2_deg", "d3_mm", "theta4_deg", "theta5_deg", "theta6_deg"});
+  for (Eigen::Index leg = 0; leg < 6; ++leg) {
+    std::vector<std::string> cells{std::to_string(leg + 1)};
+    for (const double value : in_degrees(table.row(leg))) cells.push_back(fmt::format("{:.6f}", value));
+    text.add_row(cells);
+  }
+  fmt::print("{}", text.text());
+  return kDone;
+}
+
+int write_dh(const LegsFlags& flags, const Machine& machine) {
+  std::string text = provenance_line(kVersion, "legs", {machine_file(flags.machine), flags.poses});
+  text += "pose,leg,theta1_deg,theta2_deg,d3_mm,theta4_deg,theta5_deg,theta6_deg\n";
+  for (const PoseRecord& record : read_pose_table(flags.poses)) {
+    if (!record.pose) continue;
+    const Matrix6d table = dh_table(machine.rest.chains, machine.geometry.B_from_P(*record.pose));
+    for (Eigen::Index leg = 0; leg < 6; ++leg) {
+      text += fmt::format("{},{}", csv_field(record.id), leg + 1);
+      for (const double value : in_degrees(table.row(leg))) {
+        text += ',';
+        append_number(text, value, 9);
+      }
+      text += '\n';
+    }
+  }
+  write_file_atomically(flags.out, text);
+  return kDone;
+}
+
 int run_legs(const LegsFlags& flags) {
   if (flags.poses.empty() == flags.pose.empty())
     throw InputError("--poses, --pose: found none or both, wanted exactly one of them");
   const Machine machine = read_machine(flags.machine);
+  if (flags.dh) {
+    return flags.pose.empty() ? write_dh(flags, machine)
+                              : print_dh(machine, pose_from_mm_deg(six_numbers(flags.pose, "--pose")));
+  }
   if (!flags.pose.empty()) {
     const LegsAnswer answer = solve(machine, pose_from_mm_deg(six_numbers(flags.pose, "--pose")));
     if (answer.readings) {
@@ -90,9 +134,12 @@ void add_legs_command(CLI::App& app, Action& action) {
   command->add_option("--poses", flags->poses, "pose,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg");
   command->add_option("-o,--output", flags->out, "table to write")->capture_default_str();
   command->add_option("--pose", flags->pose, "one pose, X,Y,Z,ROLL,PITCH,YAW in mm and deg, printed instead");
+  command->add_flag("--dh", flags->dh,
+                    "the legs' Denavit-Hartenberg variables (modified, Craig's) instead of their readings");
   command->footer(
       "Synopsis:\n"
       "  hexcal legs --hexapod hexapod.yaml --poses targets.csv -o legs.csv\n"
+      "  hexcal legs --hexapod hexapod.yaml --dh --poses targets.csv -o dh.csv\n"
       "  hexcal legs --model model.yaml --pose 5,-3,2,0.5,1,-2\n"
       "Status: ok, too_short, too_long, base_joint, platform_joint, legs_collide, grips_collide, "
       "beyond_singular, "

@@ -49,7 +49,7 @@ std::vector<PoseRecord> read_pose_table(const std::filesystem::path& path, ReadF
     if (table.has_column("status")) record.status = table.text(row, "status");
     const bool may_be_empty = record.status != "ok" && !is_suspect(record.status);
     if (auto v = read_six(table, row, kPoseColumns, may_be_empty)) {
-      record.pose = Pose::from_vector(mm_rad(*v));
+      record.pose = wrapped(Pose::from_vector(mm_rad(*v)));
     }
     if (has_sigma && record.pose) {
       Vector6d sigma;
