@@ -69,10 +69,9 @@ std::vector<DecodedMarker> without_overlaps(std::vector<DecodedMarker> markers, 
   return kept;
 }
 
-std::vector<DecodedMarker> read_markers(const cv::Mat& grey, const MarkerFamily& family,
-                                        const DetectionOptions& options) {
-  const MarkerDecoder decoder(family, options.ids);
-  const std::vector<Quad> quads = find_quads(grey, options.refine.min_side_px);
+std::vector<DecodedMarker> read_markers(const cv::Mat& grey, const std::vector<Quad>& quads,
+                                        const MarkerFamily& family, const std::vector<int>& ids) {
+  const MarkerDecoder decoder(family, ids);
   std::vector<std::optional<DecodedMarker>> read(quads.size());
   tbb::parallel_for(std::size_t{0}, quads.size(),
                     [&](std::size_t i) { read[i] = decoder.decode(grey, quads[i]); });
@@ -123,7 +122,9 @@ std::vector<MarkerObservation> detect_markers(const cv::Mat& grey, ToneCurve ton
                                               const DetectionOptions& options, const CameraModel* camera) {
   options.validate();
   CV_Assert(grey.type() == CV_8UC1 || grey.type() == CV_16UC1);
-  const std::vector<DecodedMarker> markers = read_markers(eight_bit(grey, tone), family, options);
+  const cv::Mat eight = eight_bit(grey, tone);
+  const std::vector<DecodedMarker> markers =
+      read_markers(eight, find_quads(eight, options.refine.min_side_px), family, options.ids);
   std::vector<MarkerObservation> observations;
   std::vector<std::size_t> measured;
   std::vector<MarkerGuess> guesses;
@@ -143,6 +144,24 @@ std::vector<MarkerObservation> detect_markers(const cv::Mat& grey, ToneCurve ton
     observations[i].status = observations[i + 1].status = MarkerStatus::duplicate;
   }
   return observations;
+}
+
+std::vector<FamilyReading> read_families(const cv::Mat& grey, ToneCurve tone,
+                                         const std::vector<std::string>& families) {
+  CV_Assert(grey.type() == CV_8UC1 || grey.type() == CV_16UC1);
+  const cv::Mat eight = eight_bit(grey, tone);
+  const std::vector<Quad> quads = find_quads(eight, RefineOptions().min_side_px);
+  std::vector<FamilyReading> readings;
+  for (const std::string& name : families) {
+    FamilyReading reading{name, {}};
+    for (const DecodedMarker& marker : read_markers(eight, quads, marker_family(name), {})) {
+      const MarkerStatus status = status_as_read(marker, grey);
+      if (marker.wrong_cells == 0 && status == MarkerStatus::ok)
+        reading.markers.push_back(observation_as_read(marker, status));
+    }
+    readings.push_back(std::move(reading));
+  }
+  return readings;
 }
 
 PhotographObservations observe_photograph(const Photograph& photograph, const MarkerFamily& family,

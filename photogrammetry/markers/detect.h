@@ -31,6 +31,18 @@ struct DetectionOptions {
                                                             const DetectionOptions& options = {},
                                                             const CameraModel* camera = nullptr);
 
+/// What of one family can be read in a photograph.
+struct FamilyReading {
+  std::string family;
+  std::vector<MarkerObservation>
+      markers;  ///< sorted by id; corners as found, within about 2 px, not measured
+};
+
+/// Reads, without measuring, the markers of several families; only those without a wrong cell, so that one
+/// family's markers are seldom another's. For questions such as which family was printed.
+[[nodiscard]] std::vector<FamilyReading> read_families(const cv::Mat& grey, ToneCurve tone,
+                                                       const std::vector<std::string>& families);
+
 /// One photograph as the later stages see it: no pixels.
 struct PhotographObservations {
   std::string name;  ///< as given by the user, for instance relative to the image folder

@@ -26,6 +26,7 @@ from attack_lab import Lab
 
 # A good call of each command, in a campaign that was measured. Paths that are written lie under out/.
 CALLS = {
+    "init": ["init", "out/new", "--marker-mm", "24"],
     "template": ["template", "aprilgrid", "-o", "out/sheet.pdf", "--tag-mm", "20", "--gap-mm", "6"],
     "camera": ["camera", "calibration", "--template", "sheet.yaml", "-o", "out/camera.yaml"],
     "simulate": ["simulate", "-o", "out/campaign", "--no-images", "--poses", "3"],

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/support/run_hexcal.h"
@@ -114,6 +115,26 @@ TEST_F(CamerasByFolder, ACameraThatSuitsNoPhotographEndsEveryCommandAndNothingIs
     for (const char* file : {"poses.csv", "quality.json", "observations.txt", "report.html"})
       EXPECT_FALSE(fs::exists(lab_ / "results" / file)) << command.front() << " wrote " << file;
   }
+}
+
+TEST(CameraLibrary, ListsItsFilesWithTheirSettings) {
+  const TemporaryFolder folder;
+  const fs::path library = folder.path() / "cameras";
+  EXPECT_EQ(run_hexcal({"camera", "--library", library.string(), "--list"}).exit_code, 2);
+  fs::create_directories(library);
+  EXPECT_THAT(run_hexcal({"camera", "--library", library.string(), "--list"}).err,
+              ::testing::HasSubstr("holds no camera file"));
+  fs::copy(fs::path(HEXCAL_SOURCE) / "samples/small_lab/camera.yaml", library / "a.yaml");
+  const CommandResult listed = run_hexcal({"camera", "--library", library.string(), "--list"});
+  EXPECT_EQ(listed.exit_code, 0) << listed.err;
+  EXPECT_THAT(listed.out, ::testing::ContainsRegex("a.yaml +NIKON D3200 +35 .*1504 x "));
+  std::ofstream(library / "b.yaml") << "kind: aprilgrid\n";
+  const CommandResult json = run_hexcal({"camera", "--library", library.string(), "--list", "--json"});
+  EXPECT_EQ(json.exit_code, 1);
+  const auto parsed = nlohmann::json::parse(json.out);
+  EXPECT_EQ(parsed[0]["focal_length_mm"], 35);
+  EXPECT_THAT(parsed[1]["error"].get<std::string>(), ::testing::HasSubstr("b.yaml"));
+  EXPECT_EQ(run_hexcal({"camera", "--list"}).exit_code, 2);
 }
 
 }  // namespace

@@ -93,6 +93,38 @@ TEST(Csv, ReadsQuotesCommentsAndWindowsLines) {
   EXPECT_THAT(table.comments(), testing::ElementsAre("# head"));
 }
 
+// The same table as an English, a German and a Unicode spreadsheet saves it.
+TEST(Csv, ReadsWhatSpreadsheetsWrite) {
+  const std::string semicolons = "id;x_mm;note\n a ;-1,5;\"1;2\"\nb;2e3;\n";
+  std::string utf16le = "\xFF\xFE";
+  std::string utf16be = "\xFE\xFF";
+  std::string tabs;
+  std::string old_mac;
+  for (const char c : semicolons) {
+    utf16le += {c, '\0'};
+    utf16be += {'\0', c};
+    old_mac += c == '\n' ? '\r' : c;
+    tabs += c == ';' ? '\t' : c;
+  }
+  for (const std::string& text :
+       {semicolons, utf16le, utf16be, old_mac, "\xEF\xBB\xBF" + semicolons, tabs,
+        "\"# hexcal, a comment with commas\";;\n" + semicolons, "# comment;;\n" + semicolons + ";;\n"}) {
+    const CsvTable table = CsvTable::parse(text, "t.csv");
+    EXPECT_THAT(table.columns(), testing::ElementsAre("id", "x_mm", "note")) << text;
+    ASSERT_EQ(table.rows(), 2U) << text;
+    EXPECT_EQ(table.text(0, "id"), "a") << text;
+    EXPECT_EQ(table.number(0, "x_mm"), -1.5) << text;
+    EXPECT_EQ(table.number(1, "x_mm"), 2000) << text;
+  }
+  EXPECT_EQ(CsvTable::parse("id;x_mm;;\n\xC3\xA4;1;;\n", "t.csv").text(0, "id"), "\xC3\xA4");
+  EXPECT_EQ(CsvTable::parse(std::string("\xFF\xFEi\0d\0\n\0\xE4\0", 10), "t.csv").text(0, "id"), "\xC3\xA4");
+  // Thousands are not guessed at, and with commas between fields a decimal comma is another field.
+  EXPECT_THAT([] { (void)CsvTable::parse("a;b\n1.234,5;2\n", "t.csv").number(0, "a"); },
+              ThrowsInputError("'1.234,5' is not a number"));
+  EXPECT_THAT([] { (void)CsvTable::parse("a,b\n1,5,2\n", "t.csv"); },
+              ThrowsInputError("found 3 fields, wanted 2"));
+}
+
 TEST(Csv, NamesLineAndColumn) {
   const CsvTable table = CsvTable::parse("# c\nid,x_mm\na,1\nb,word\n", "t.csv");
   EXPECT_THAT([&] { (void)table.number(1, "x_mm"); },

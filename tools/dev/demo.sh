@@ -1,16 +1,20 @@
 #!/usr/bin/env bash
-# The whole way on rendered photographs: a virtual Stewart platform with hidden errors is photographed, the camera is
-# calibrated, the poses are measured, the machine is identified, and corrected commands for other poses are tried on the
-# same machine. Ends with two tables: measured against true poses, and errors before and after compensation.
+# The main job twice. First on the sample's bare photographs, as they come from a memory card: nothing is described by
+# hand. Then the whole way on rendered photographs: a virtual Stewart platform with hidden errors is photographed, the
+# camera is calibrated, the poses are measured, the machine is identified, and corrected commands for other poses are
+# tried on the same machine. Ends with two tables, measured against true poses and errors before and after compensation,
+# and with the names of the reports.
 # Usage: tools/dev/demo.sh [FOLDER]   (default build/demo; an existing folder is replaced)
+# HEXCAL_DEMO_POSES and HEXCAL_DEMO_WIDTH make the rendered campaign larger (24 and 3008: the figures of README.md).
 # With HEXCAL=PROGRAM nothing is installed or built and that program is run.
 set -euo pipefail
 folder=${1:-build/demo}
-poses=${HEXCAL_DEMO_POSES:-24}
-width=${HEXCAL_DEMO_WIDTH:-3008}
+poses=${HEXCAL_DEMO_POSES:-12}
+width=${HEXCAL_DEMO_WIDTH:-1504}
 
 step() { printf '\n== %s\n' "$*"; }
 
+sample=$(realpath -m "$(dirname "$0")/../../samples/small_lab")
 hexcal=${HEXCAL:-}
 if [ -z "$hexcal" ]; then
   cd "$(dirname "$0")/../.."
@@ -22,6 +26,15 @@ if [ -z "$hexcal" ]; then
 fi
 
 rm -rf "$folder"
+reports=$folder/round1/results/report.html
+if [ -d "$sample" ]; then  # the program is also installed without it
+  step "the sample's photographs in one heap, and the sheet.yaml that was printed with the camera's sheet"
+  mkdir -p "$folder/card"
+  cp "$sample"/poses/*/*.jpg "$sample"/calibration/*.jpg "$sample/sheet.yaml" "$folder/card"
+  "$hexcal" init "$folder/card" --marker-mm 24
+  "$hexcal" run "$folder/card"
+  reports="$folder/card/results/report.html and $reports"
+fi
 step "photograph a virtual hexapod with hidden errors: home and $poses poses, 3 photographs each, and a template"
 "$hexcal" simulate -o "$folder/round1" --poses "$poses" --width "$width" --lens profile --focal-mm 35 --seed 66
 step "calibrate the camera"
@@ -41,3 +54,5 @@ step "measured poses against the truth"
 step "true errors of the machine at the other poses before and after compensation"
 "$hexcal" evaluate --targets "$folder/other/targets.csv" --before "$folder/before/truth/poses.csv" \
   --after "$folder/after/truth/poses.csv"
+
+step "done; to look at: $reports"

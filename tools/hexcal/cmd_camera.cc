@@ -13,6 +13,7 @@
 #include "kinematics/geometry/input_error.h"
 #include "photogrammetry/photograph/photograph_format.h"
 #include "tools/hexcal/acceptance_limits.h"
+#include "tools/hexcal/camera_library.h"
 #include "tools/hexcal/camera_tables.h"
 #include "tools/hexcal/command.h"
 #include "tools/hexcal/terminal.h"
@@ -42,6 +43,7 @@ struct CameraFlags {
   std::string lens;
   std::string board;
   AcceptanceLimits limits;
+  bool list = false;
   bool json = false;
 };
 
@@ -53,6 +55,7 @@ constexpr const char* kCameraFooter = R"(  hexcal camera photographs/ --template
   f_px      9011.13 +- 0.21
   verdict: good
 
+  hexcal camera --library cameras/ --list   the camera files of a library with their lens settings
   hexcal camera --compare a.yaml b.yaml     how far two calibrations differ, and whether that is more than noise
 
 Exit code 1 if photographs failed or the verdict is retake; the camera file is written all the same.)";
@@ -145,6 +148,15 @@ int compare(const CameraFlags& flags) {
   return kDone;
 }
 
+int list_library(const CameraFlags& flags) {
+  if (flags.library.empty()) throw InputError("--list: wanted --library DIR");
+  const std::vector<LibraryEntry> entries = read_camera_library(flags.library);
+  fmt::print("{}", flags.json ? camera_library_json(entries) : camera_library_table(entries));
+  const bool all_read =
+      std::all_of(entries.begin(), entries.end(), [](const auto& e) { return e.fault.empty(); });
+  return all_read ? kDone : kSomeFailed;
+}
+
 using NamedText = std::pair<fs::path, std::string>;
 
 // Everything asked for but the page.
@@ -173,6 +185,7 @@ std::vector<NamedText> files_of(const CameraFlags& flags, const std::vector<Shee
 
 int run_camera(const CameraFlags& flags) {
   if (!flags.compare.empty()) return compare(flags);
+  if (flags.list) return list_library(flags);
   if (flags.images.empty()) throw InputError("IMAGES: wanted photographs or a folder of them");
   if (flags.templates.empty()) throw InputError("--template: wanted the sheet.yaml of the printed sheet");
   if (flags.output.empty() && flags.library.empty())
@@ -223,6 +236,7 @@ void add_camera_command(CLI::App& app, Action& action) {
   command->add_option(
       "--library", flags->library,
       "folder in which to file the camera by its lens setting; campaign.yaml takes the folder as `camera:`");
+  command->add_flag("--list", flags->list, "list the library instead of calibrating");
   command->add_option("--poses", flags->poses,
                       "CSV to write: the sheet's pose in every photograph with sigmas");
   command->add_option("--report", flags->report,

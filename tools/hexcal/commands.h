@@ -5,6 +5,7 @@
 namespace hexcal {
 
 // One per cmd_NAME.cc: adds the subcommand with its flags and sets `action` when it is the one called.
+void add_init_command(CLI::App& app, Action& action);
 void add_template_command(CLI::App& app, Action& action);
 void add_camera_command(CLI::App& app, Action& action);
 void add_simulate_command(CLI::App& app, Action& action);

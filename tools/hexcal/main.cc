@@ -60,12 +60,12 @@ int main(int argc, char** argv) {
   hexcal::Action action;
   // In the order of a day's work.
   for (const auto add :
-       {hexcal::add_template_command, hexcal::add_camera_command, hexcal::add_simulate_command,
-        hexcal::add_detect_command, hexcal::add_check_command, hexcal::add_run_command,
-        hexcal::add_measure_command, hexcal::add_watch_command, hexcal::add_plan_command,
-        hexcal::add_compensate_command, hexcal::add_evaluate_command, hexcal::add_legs_command,
-        hexcal::add_pose_command, hexcal::add_workspace_command, hexcal::add_report_command,
-        hexcal::add_export_command, hexcal::add_completion_command}) {
+       {hexcal::add_init_command, hexcal::add_template_command, hexcal::add_camera_command,
+        hexcal::add_simulate_command, hexcal::add_detect_command, hexcal::add_check_command,
+        hexcal::add_run_command, hexcal::add_measure_command, hexcal::add_watch_command,
+        hexcal::add_plan_command, hexcal::add_compensate_command, hexcal::add_evaluate_command,
+        hexcal::add_legs_command, hexcal::add_pose_command, hexcal::add_workspace_command,
+        hexcal::add_report_command, hexcal::add_export_command, hexcal::add_completion_command}) {
     add(app, action);
   }
   try {

@@ -7,6 +7,7 @@
 
 #include "kinematics/geometry/input_error.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/csv_dialect.h"
 #include "tools/io/scalar_text.h"
 
 namespace hexcal {
@@ -18,7 +19,7 @@ constexpr std::size_t kMaxFieldBytes = std::size_t{1} << 20;
 
 // Takes one record off `text`, which may span lines inside quotes; counts the lines it took. Stops early at
 // a field or a number of fields that no table has.
-std::vector<std::string> take_record(std::string_view& text, int& lines) {
+std::vector<std::string> take_record(std::string_view& text, char separator, int& lines) {
   std::vector<std::string> fields;
   std::string field;
   bool quoted = false;
@@ -45,7 +46,7 @@ std::vector<std::string> take_record(std::string_view& text, int& lines) {
     } else if (c == '"' && trimmed(field).empty()) {
       field.clear();
       quoted = was_quoted = true;
-    } else if (c == ',') {
+    } else if (c == separator) {
       finish_field();
     } else if (c == '\n') {
       break;
@@ -58,31 +59,44 @@ std::vector<std::string> take_record(std::string_view& text, int& lines) {
   return fields;
 }
 
+// Spreadsheets fill up lines that are shorter than others with empty fields.
+void drop_empty_end(std::vector<std::string>& fields, std::size_t wanted) {
+  while (fields.size() > wanted && fields.back().empty()) fields.pop_back();
+}
+
 }  // namespace
 
-CsvTable CsvTable::parse(std::string_view text, const std::filesystem::path& path) {
+CsvTable CsvTable::parse(std::string_view bytes, const std::filesystem::path& path) {
   CsvTable table;
   table.path_ = path;
-  if (text.substr(0, 3) == "\xEF\xBB\xBF") text.remove_prefix(3);
+  const std::string utf8 = csv_as_utf8(std::string(bytes));
+  std::string_view text = utf8;
   int line = 1;
   while (!text.empty()) {
     const std::size_t end = text.find('\n');
     const std::string_view first_line = text.substr(0, end);
     const std::string_view head = trimmed(first_line);
-    if (head.empty() || head[0] == '#') {
+    // A comment with commas is quoted by a spreadsheet.
+    const bool comment = head.starts_with('#') || (table.columns_.empty() && head.starts_with("\"#"));
+    if (head.empty() || comment) {
       if (!head.empty()) table.comments_.emplace_back(head);
       text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
       ++line;
       continue;
     }
+    if (table.columns_.empty()) table.separator_ = csv_separator(first_line);
     int lines = 1;
-    Row row{line, take_record(text, lines)};
+    Row row{line, take_record(text, table.separator_, lines)};
     if (row.fields.size() > kMaxColumns || row.fields.back().size() > kMaxFieldBytes) {
       throw InputError(
           fmt::format("{}:{}: no CSV table: more than {} fields in a line, or one of more than {} bytes",
                       path.string(), line, kMaxColumns, kMaxFieldBytes));
     }
     line += lines;
+    drop_empty_end(row.fields, table.columns_.empty() ? 1 : table.columns_.size());
+    const bool blank =
+        std::all_of(row.fields.begin(), row.fields.end(), [](const auto& f) { return f.empty(); });
+    if (blank && table.separator_ != ',') continue;
     if (table.columns_.empty()) {
       table.columns_ = std::move(row.fields);
       for (std::size_t i = 0; i < table.columns_.size(); ++i) {
@@ -135,7 +149,7 @@ void CsvTable::fail(std::size_t row, std::string_view column, const std::string&
 
 double CsvTable::number(std::size_t row, std::string_view column) const {
   const std::string& field = text(row, column);
-  const auto value = number_from_text(field);
+  const auto value = csv_number(field, separator_);
   if (!value) fail(row, column, fmt::format("'{}' is not a number", field));
   return *value;
 }

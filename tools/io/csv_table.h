@@ -10,12 +10,13 @@
 
 namespace hexcal {
 
-/// A CSV table with named columns. Lines that begin with '#' are comments; fields may be quoted; CRLF, a byte
-/// order mark and blank lines are accepted. All errors are InputError and name file, line and column.
+/// A CSV table with named columns. Lines that begin with '#' are comments; fields may be quoted; blank lines
+/// and what spreadsheets write (csv_dialect.h: semicolons, tabs, decimal commas, UTF-16, any line ends) are
+/// accepted. All errors are InputError and name file, line and column.
 class CsvTable {
  public:
   [[nodiscard]] static CsvTable read(const std::filesystem::path& path, ReadFor purpose = ReadFor::input);
-  [[nodiscard]] static CsvTable parse(std::string_view text, const std::filesystem::path& path);
+  [[nodiscard]] static CsvTable parse(std::string_view bytes, const std::filesystem::path& path);
 
   [[nodiscard]] std::size_t rows() const { return rows_.size(); }
   [[nodiscard]] bool has_column(std::string_view name) const;
@@ -43,6 +44,7 @@ class CsvTable {
   [[nodiscard]] std::size_t column_index(std::string_view name) const;
 
   std::filesystem::path path_;
+  char separator_ = ',';
   std::vector<std::string> columns_;
   std::vector<std::string> comments_;
   std::vector<Row> rows_;

@@ -11,6 +11,7 @@
 #include "photogrammetry/photograph/input_file.h"
 #include "photogrammetry/photograph/sha256.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/csv_dialect.h"
 #include "tools/io/output_file.h"
 #include "tools/io/scalar_text.h"
 
@@ -22,16 +23,17 @@ namespace fs = std::filesystem;
 constexpr std::size_t kBlock = std::size_t{1} << 22;
 constexpr std::size_t kLongestLine = std::size_t{1} << 20;
 
-// Splits a line at its commas; quoted fields may hold commas. Quotes are taken off, doubled ones within are
+// Splits a line at its separators; quoted fields may hold them. Quotes are taken off, doubled ones within are
 // kept in `unquoted` storage.
-void split(std::string_view line, std::vector<std::string_view>& fields, std::vector<std::string>& unquoted) {
+void split(std::string_view line, char separator, std::vector<std::string_view>& fields,
+           std::vector<std::string>& unquoted) {
   fields.clear();
   unquoted.clear();
   unquoted.reserve(32);  // views into the strings must stay where they are
   std::size_t at = 0;
   while (true) {
-    std::size_t end = line.find(',', at);
-    const std::size_t first = line.find_first_not_of(" \t", at);
+    std::size_t end = line.find(separator, at);
+    const std::size_t first = line.find_first_not_of(' ', at);
     if (first != std::string_view::npos && line[first] == '"' && unquoted.size() < 32) {
       std::string text;
       std::size_t i = first + 1;
@@ -44,7 +46,7 @@ void split(std::string_view line, std::vector<std::string_view>& fields, std::ve
           text += line[i];
         }
       }
-      end = line.find(',', i);
+      end = line.find(separator, i);
       unquoted.push_back(std::move(text));
       fields.push_back(unquoted.back());
     } else {
@@ -65,13 +67,16 @@ struct Layout {
   std::size_t id = 0;
   std::vector<std::size_t> numbers;
   std::size_t fields = 0;
+  char separator = ',';
 };
 
 Layout layout_of(std::string_view header, const fs::path& path, std::size_t line,
                  const RowTransform& transform) {
   std::vector<std::string_view> names;
   std::vector<std::string> storage;
-  split(header, names, storage);
+  Layout layout;
+  layout.separator = csv_separator(header);
+  split(header, layout.separator, names, storage);
   const auto find = [&](const std::string& wanted) {
     for (std::size_t i = 0; i < names.size(); ++i) {
       if (names[i] == wanted) return i;
@@ -81,7 +86,6 @@ Layout layout_of(std::string_view header, const fs::path& path, std::size_t line
     throw InputError(
         fmt::format("{}:{}: found columns {}, wanted a column '{}'", path.string(), line, found, wanted));
   };
-  Layout layout;
   layout.id = find(transform.id_column);
   for (const std::string& column : transform.columns) layout.numbers.push_back(find(column));
   layout.fields = names.size();
@@ -106,14 +110,14 @@ Piece transformed(std::string_view text, std::size_t first_line, const fs::path&
     const std::string_view row = text.substr(0, end);
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
     if (!is_content(row)) continue;
-    split(row, fields, storage);
+    split(row, layout.separator, fields, storage);
     if (fields.size() != layout.fields) {
       throw InputError(fmt::format("{}:{}: found {} fields, wanted {} as in the header", path.string(), line,
                                    fields.size(), layout.fields));
     }
     for (std::size_t k = 0; k < numbers.size(); ++k) {
       const std::string_view field = trimmed(fields[layout.numbers[k]]);
-      const auto number = number_from_text(field);
+      const auto number = csv_number(field, layout.separator);
       if (!number) {
         throw InputError(fmt::format("{}:{}: {}: found '{}', wanted a number", path.string(), line,
                                      transform.columns[k], field));
@@ -139,11 +143,19 @@ class BlockReader {
     } else {
       file_.emplace(path);
       check();
+      std::array<char, 2> first{};
+      const bool recoded = begins_as_utf16({first.data(), file_->read(first.data(), first.size())});
+      file_->rewind();
+      if (recoded) {
+        sha256_ = sha256();
+        kept_ = csv_as_utf8(read_file(path));
+        file_.reset();
+      }
     }
   }
   // Hash of all of it, before the first block is read.
   std::string sha256() {
-    if (!file_) return sha256_hex(kept_);
+    if (!file_) return sha256_.empty() ? sha256_hex(kept_) : sha256_;
     Sha256 hash;
     std::string block(kBlock, '\0');
     while (const std::size_t count = file_->read(block.data(), block.size()))
@@ -171,6 +183,7 @@ class BlockReader {
   fs::path path_;
   std::optional<InputFile> file_;
   std::string kept_;
+  std::string sha256_;  // of the file where kept_ was recoded
   std::size_t at_ = 0;
 };
 
