@@ -219,10 +219,11 @@ CalibrationReport calibrate(const PlatformGeometry& nominal, const ObservationSe
 }
 
 std::vector<CorrectedCommand> corrected_commands(const CalibrationReport& report,
-                                                 const std::vector<Target>& targets) {
+                                                 const std::vector<Target>& targets,
+                                                 const LegVector& approach) {
   const auto& identified = report.fitted.identified;
   std::vector<CorrectedCommand> commands =
-      compensate(report.fitted.model, targets, identified ? &*identified : nullptr);
+      compensate(report.fitted.model, targets, identified ? &*identified : nullptr, approach);
   if (!report.doubt) return commands;
   for (CorrectedCommand& command : commands) {
     command.status = CommandStatus::withheld;

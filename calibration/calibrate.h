@@ -64,6 +64,7 @@ struct CalibrationReport {
 /// The chosen method's commands for the targets; where the report doubts the machine, every one is `withheld`
 /// and has no numbers.
 [[nodiscard]] std::vector<CorrectedCommand> corrected_commands(const CalibrationReport& report,
-                                                               const std::vector<Target>& targets);
+                                                               const std::vector<Target>& targets,
+                                                               const LegVector& approach = LegVector::Zero());
 
 }  // namespace hexcal

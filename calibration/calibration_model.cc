@@ -35,10 +35,11 @@ std::optional<CompensationMethod> method_from_name(std::string_view text) {
   return std::nullopt;
 }
 
-std::optional<LegVector> readings_for_pose(const CalibrationModel& model, const Pose& pose) {
+std::optional<LegVector> readings_for_pose(const CalibrationModel& model, const Pose& pose,
+                                           const LegVector& approach) {
   LegVector readings;
   if (model.method == CompensationMethod::kinematic) {
-    readings = machine_readings(model.machine, pose);
+    readings = machine_readings(model.machine, pose, approach);
   } else {
     const Pose command =
         model.method == CompensationMethod::nominal ? pose : predicted_pose(model.nominal, model.paper, pose);

@@ -25,7 +25,9 @@ struct CalibrationModel {
 };
 
 /// Readings at which the machine stands at a pose given as it was measured; nothing where there are none.
-[[nodiscard]] std::optional<LegVector> readings_for_pose(const CalibrationModel& model, const Pose& pose);
+/// `approach`: as below.
+[[nodiscard]] std::optional<LegVector> readings_for_pose(const CalibrationModel& model, const Pose& pose,
+                                                         const LegVector& approach = LegVector::Zero());
 
 /// Pose, as it would be measured, of the machine at readings; nothing where none is found. `approach`: +1, -1
 /// or 0 per leg, the direction of its last movement (of machines with backlash).

@@ -23,15 +23,17 @@ void check_limits(const PlatformGeometry& nominal, const RestState& rest, Correc
 
 }  // namespace
 
-Vector6d predicted_sigma(const IdentifyResult& identified, const Pose& pose) {
+Vector6d predicted_sigma(const IdentifyResult& identified, const Pose& pose, const LegVector& approach) {
   const LegLinearization legs = linearize_legs(
       identified.machine, MachineModel{.geometry = identified.machine.geometry}, identified.layout,
-      identified.stroke_range, pose, machine_readings(identified.machine, pose), LegVector::Zero());
+      identified.stroke_range, pose, machine_readings(identified.machine, pose, approach), approach);
   const ReducedPose reduced =
       reduce_to_observed(legs, {true, true, true, true, true, true}, identified.selection);
   const double leg_variance = identified.leg_sigma_mm * identified.leg_sigma_mm;
   Matrix6d leg_covariance = reduced.jacobian * identified.covariance * reduced.jacobian.transpose() +
                             leg_variance * Matrix6d::Identity();
+  for (Eigen::Index k = 0; k < 6; ++k)
+    if (approach[k] == 0) leg_covariance(k, k) += std::pow(identified.machine.backlash_mm[k] / 2, 2);
   if (identified.drift) {
     // The model is that of the middle of the campaign; the machine stands where it ended, or farther.
     const Vector6d moved =
@@ -43,7 +45,7 @@ Vector6d predicted_sigma(const IdentifyResult& identified, const Pose& pose) {
 }
 
 std::vector<CorrectedCommand> compensate(const CalibrationModel& model, const std::vector<Target>& targets,
-                                         const IdentifyResult* identified) {
+                                         const IdentifyResult* identified, const LegVector& approach) {
   CalibrationModel in_hexapod_frames = model;
   in_hexapod_frames.machine = machine_in_hexapod_frames(model);
   const RestState rest(model.nominal);
@@ -52,7 +54,7 @@ std::vector<CorrectedCommand> compensate(const CalibrationModel& model, const st
     CorrectedCommand command;
     command.id = target.id;
     command.target = target.pose;
-    command.readings = readings_for_pose(in_hexapod_frames, target.pose);
+    command.readings = readings_for_pose(in_hexapod_frames, target.pose, approach);
     if (!command.readings) {
       command.reason = "the identified machine cannot take this pose";
       commands.push_back(command);
@@ -72,7 +74,7 @@ std::vector<CorrectedCommand> compensate(const CalibrationModel& model, const st
       // The same place of the platform, as the measurement's frames see it.
       const Pose seen = identified->machine.geometry.pose_from_B_from_P(
           in_hexapod_frames.machine.geometry.B_from_P(target.pose));
-      command.sigma = predicted_sigma(*identified, seen);
+      command.sigma = predicted_sigma(*identified, seen, approach);
     }
     commands.push_back(command);
   }

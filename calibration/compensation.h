@@ -35,13 +35,18 @@ struct Target {
 
 /// Readings by the model's exact inverse kinematics; the equivalent pose by nominal forward kinematics, whose
 /// legs agree with the readings to 1e-9 mm. Strokes and joints are checked on the corrected command.
-/// `identified` gives the sigmas: parameters and leg noise propagated to the pose.
+/// `identified` gives the sigmas: parameters and leg noise propagated to the pose. `approach`: +1, -1 or 0
+/// per leg, the direction from which the machine is going to reach every target; identified backlash is then
+/// compensated.
 [[nodiscard]] std::vector<CorrectedCommand> compensate(const CalibrationModel& model,
                                                        const std::vector<Target>& targets,
-                                                       const IdentifyResult* identified = nullptr);
+                                                       const IdentifyResult* identified = nullptr,
+                                                       const LegVector& approach = LegVector::Zero());
 
 /// Sigma of x .. yaw that an identified machine's pose has at readings for `pose`: uncertainty of the
-/// parameters, the legs' own noise and a drift. `pose` in the frames of identified.machine.
-[[nodiscard]] Vector6d predicted_sigma(const IdentifyResult& identified, const Pose& pose);
+/// parameters, the legs' own noise, a drift and, of legs that come from an unknown direction (`approach` 0),
+/// half their backlash. `pose` in the frames of identified.machine.
+[[nodiscard]] Vector6d predicted_sigma(const IdentifyResult& identified, const Pose& pose,
+                                       const LegVector& approach = LegVector::Zero());
 
 }  // namespace hexcal

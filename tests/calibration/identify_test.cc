@@ -221,6 +221,53 @@ TEST(Identify, PredictedErrorsAreHonestWithPlayAndWithoutSigmas) {
   }
 }
 
+// Play that was identified from approach directions: unknown directions leave half of it, and say so; a known
+// one takes it out.
+TEST(Identify, BacklashIsTakenOutWhereTheApproachIsKnown) {
+  const PlatformGeometry nominal = surrogate_hexapod();
+  std::mt19937_64 rng(4);
+  std::bernoulli_distribution coin;
+  std::array<double, 2> squares{};  // normalised: unknown and known direction
+  std::array<double, 2> position_mm2{};
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    MachineModel truth = as_built(nominal, {}, seed);
+    truth.backlash_mm = LegVector::Constant(0.2);
+    const auto any_way = [&] {
+      LegVector approach;
+      for (double& one : approach) one = coin(rng) ? 1 : -1;
+      return approach;
+    };
+    ObservationSet set = measured(truth, nominal, random_poses(34, {}, 100 + seed), {0.02, 0.005, seed});
+    for (PoseObservation& pose : set.poses) {
+      const Vector6d noise = pose.measured.vector() - machine_pose(truth, pose.readings)->vector();
+      pose.approach = any_way();
+      pose.measured =
+          Pose::from_vector(machine_pose(truth, pose.readings, {}, pose.approach)->vector() + noise);
+    }
+    IdentifyOptions options;
+    options.backlash = true;
+    const IdentifyResult result = identify(nominal, set, options);
+    ASSERT_EQ(result.status, IdentifyStatus::identified) << result.reason;
+    for (const Pose& target : random_poses(20, {}, 900 + seed)) {
+      for (const std::size_t known : {0, 1}) {
+        const LegVector down = LegVector::Constant(-1);
+        const LegVector told = known == 1 ? down : LegVector(LegVector::Zero());
+        const auto reached = machine_pose(truth, machine_readings(result.machine, target, told), {},
+                                          known == 1 ? down : any_way());
+        const Vector6d error = pose_error(*reached, target);
+        squares[known] +=
+            error.cwiseQuotient(predicted_sigma(result, target, told)).squaredNorm() / (6 * 160);
+        position_mm2[known] += error.head<3>().squaredNorm() / 160;
+      }
+    }
+  }
+  for (const double z2 : squares) {
+    EXPECT_GT(z2, 0.7);
+    EXPECT_LT(z2, 1.3);
+  }
+  EXPECT_LT(std::sqrt(position_mm2[1]), 0.25 * std::sqrt(position_mm2[0]));
+}
+
 // A base that moves by 0.6 mm in 20 poses is named and in the predicted sigmas; machines that stay accuse
 // nobody, also those that do what the model lacks.
 TEST(Identify, ADriftOverTheCampaignIsNamed) {

@@ -2,7 +2,11 @@
 #include <gmock/gmock.h>
 #include <sys/file.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
+
+#include <array>
+#include <ctime>
 
 #include "tests/faults/fault_campaign.h"
 
@@ -42,8 +46,18 @@ TEST_F(Interruption, ASecondRunOnACampaignSaysSoAndStops) {
 
 TEST_F(Interruption, WhatAKilledRunLeftIsTakenAwayByTheNext) {
   lab_.put(lab_.folder() / "results" / ".poses.csv.999999999.3.tmp", "pose,sta");
+  // Of a process whose number has been given to another one since: this one, which was not there in 2001.
+  const fs::path reused = lab_.folder() / "results" / fmt::format(".poses.csv.{}.4.tmp", ::getpid());
+  lab_.put(reused, "pose,sta");
+  const std::array<timespec, 2> long_ago{{{1'000'000'000, 0}, {1'000'000'000, 0}}};
+  ASSERT_EQ(::utimensat(AT_FDCWD, reused.c_str(), long_ago.data(), 0), 0);
+  // Of one that is at work.
+  const fs::path mine = lab_.folder() / "results" / fmt::format(".poses.csv.{}.5.tmp", ::getpid());
+  lab_.put(mine, "pose,sta");
   FaultCampaign::expect_healthy(lab_.measure(), kAllPoses);
   EXPECT_FALSE(fs::exists(lab_.folder() / "results" / ".poses.csv.999999999.3.tmp"));
+  EXPECT_FALSE(fs::exists(reused));
+  EXPECT_TRUE(fs::exists(mine));
 }
 
 TEST_F(Interruption, AFullDiskIsAnErrorWithWordsAndLeavesTheOldResults) {

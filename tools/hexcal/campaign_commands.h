@@ -26,6 +26,7 @@ struct CompensateFlags {
   std::filesystem::path hexapod, targets, poses, legs, covariance, apply, out;
   std::string method = "auto";
   std::string frames = "known";
+  std::string approach;
   int round = 1;
   double position_sigma_mm = 0;
   double orientation_sigma_deg = 0;

@@ -93,7 +93,8 @@ std::vector<Target> read_targets(const fs::path& path) {
 
 std::vector<fs::path> write_results(const fs::path& folder, const std::string& head,
                                     const CalibrationReport& report,
-                                    const std::vector<CorrectedCommand>& commands) {
+                                    const std::vector<CorrectedCommand>& commands,
+                                    const LegVector& approach) {
   std::vector<PoseRecord> predicted;
   std::vector<LegRecord> actuators;
   for (const CorrectedCommand& command : commands) {
@@ -105,7 +106,7 @@ std::vector<fs::path> write_results(const fs::path& folder, const std::string& h
     if (ok) pose.pose = command.predicted;
     pose.sigma = command.sigma;
     predicted.push_back(pose);
-    actuators.push_back({command.id, status, ok ? command.readings : std::nullopt});
+    actuators.push_back({command.id, status, ok ? command.readings : std::nullopt, approach});
   }
   std::vector<std::pair<fs::path, std::string>> files{
       {folder / "model.yaml", model_text(head, report.fitted.model)}};
@@ -160,12 +161,15 @@ int run_compensate(CompensateFlags flags) {
   std::vector<Target> targets;
   if (!flags.apply.empty() || !flags.targets.empty())
     targets = read_targets(flags.apply.empty() ? flags.targets : flags.apply);
-  const std::vector<CorrectedCommand> commands = corrected_commands(report, targets);
+  const LegVector approach = LegVector::Constant(flags.approach == "up"     ? 1
+                                                 : flags.approach == "down" ? -1
+                                                                            : 0);
+  const std::vector<CorrectedCommand> commands = corrected_commands(report, targets, approach);
   const fs::path folder = flags.round > 1 ? flags.out / fmt::format("round{}", flags.round) : flags.out;
   inputs.push_back(flags.apply);
   std::erase_if(inputs, [](const fs::path& path) { return path.empty(); });
   const std::string head = provenance_line(kVersion, "compensate", inputs);
-  const std::vector<fs::path> written = write_results(folder, head, report, commands);
+  const std::vector<fs::path> written = write_results(folder, head, report, commands, approach);
   fmt::print("{}", flags.json ? compensation_json(report, table, commands, written)
                               : compensation_text(report, table, commands, written));
   if (!flags.json && !flags.campaign.empty())
@@ -211,6 +215,11 @@ void add_compensate_command(CLI::App& app, Action& action) {
   command->add_option("--tolerance-mm", flags->tolerance_mm,
                       "trusted tolerance of joints and leg offsets (default: estimated)");
   command->add_option("--fix", flags->fixed, "parameter held at nominal, for instance 'leg 1 base x'");
+  command
+      ->add_option("--approach", flags->approach,
+                   "up: every leg will reach its reading by growing, down: by shrinking; identified backlash "
+                   "is then compensated, and actuators.csv says so")
+      ->check(CLI::IsMember({"up", "down"}));
   command->add_flag("--with-suspect", flags->with_suspect,
                     "use poses of status suspect too (measured, but something contradicts them)");
   command->add_flag("--json", flags->json, "machine-readable output");

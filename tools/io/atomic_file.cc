@@ -1,16 +1,21 @@
 #include "tools/io/atomic_file.h"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <charconv>
 #include <csignal>
+#include <ctime>
+#include <fstream>
 #include <functional>
 #include <map>
 #include <mutex>
 #include <optional>
 #include <set>
+#include <sstream>
+#include <string>
 
 #include "kinematics/geometry/input_error.h"
 #include "photogrammetry/photograph/sha256.h"
@@ -34,6 +39,31 @@ std::optional<pid_t> maker_of(std::string_view name) {
   const auto [rest, error] = std::from_chars(name.data() + process + 1, name.data() + number, pid);
   if (error != std::errc() || rest != name.data() + number || pid <= 0) return std::nullopt;
   return pid;
+}
+
+// Whether that process still runs. Numbers of processes are used again: one that began after the file was
+// last written is another (field 22 of /proc/PID/stat, clock ticks since the machine started).
+bool still_runs(pid_t maker, const std::filesystem::path& file) {
+  if (::kill(maker, 0) != 0 && errno != EPERM) return false;
+  std::ifstream stat_file(fmt::format("/proc/{}/stat", maker));
+  std::string line;
+  struct stat written {};
+  if (!std::getline(stat_file, line) || ::stat(file.c_str(), &written) != 0) return true;
+  std::istringstream fields(line.substr(line.rfind(')') + 1));  // the name before it may hold blanks
+  std::string field;
+  for (int i = 3; i < 22; ++i) fields >> field;
+  double ticks = 0;
+  if (!(fields >> ticks)) return true;
+  const auto seconds = [](const timespec& t) {
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+  };
+  timespec now{};
+  timespec up{};
+  ::clock_gettime(CLOCK_REALTIME, &now);
+  ::clock_gettime(CLOCK_BOOTTIME, &up);
+  const double began = seconds(now) - seconds(up) + ticks / static_cast<double>(::sysconf(_SC_CLK_TCK));
+  constexpr double kTicksOff = 0.05;
+  return began <= seconds(written.st_mtim) + kTicksOff;
 }
 
 // What came through a pipe, by its name: it comes once.
@@ -124,9 +154,8 @@ void remove_abandoned_files(const std::filesystem::path& folder, std::string_vie
     const std::string name = entry.path().filename().string();
     if (!of_file.empty() && !name.starts_with(fmt::format(".{}.", of_file))) continue;
     const auto maker = maker_of(name);
-    const bool alive = maker && (::kill(*maker, 0) == 0 || errno == EPERM);
     std::error_code ignored;
-    if (maker && !alive) std::filesystem::remove(entry.path(), ignored);
+    if (maker && !still_runs(*maker, entry.path())) std::filesystem::remove(entry.path(), ignored);
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <set>
 
@@ -129,6 +130,9 @@ std::string format_leg_table(const std::string& head, const std::vector<LegRecor
                              bool with_status) {
   std::string out = head + (with_status ? "pose,status" : "pose");
   for (const char* name : kLegNames) out += fmt::format(",{}", name);
+  const bool approaches =
+      std::ranges::any_of(records, [](const LegRecord& record) { return !record.approach.isZero(0); });
+  for (int k = 1; approaches && k <= 6; ++k) out += fmt::format(",approach{}", k);
   out += '\n';
   for (const LegRecord& record : records) {
     out += csv_field(record.id);
@@ -136,6 +140,7 @@ std::string format_leg_table(const std::string& head, const std::vector<LegRecor
     for (Eigen::Index i = 0; i < 6; ++i) {
       out += record.readings ? fmt::format(",{:.9g}", (*record.readings)[i]) : std::string(",");
     }
+    for (Eigen::Index i = 0; approaches && i < 6; ++i) out += fmt::format(",{:.0f}", record.approach[i]);
     out += '\n';
   }
   return out;

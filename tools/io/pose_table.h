@@ -64,6 +64,7 @@ struct LegRecord {
   std::string id;
   std::string status = "ok";
   std::optional<Vector6d> readings;
+  Vector6d approach = Vector6d::Zero();  ///< +1 growing, -1 shrinking, 0 any; columns where a record has one
 };
 
 [[nodiscard]] std::vector<LegRecord> read_leg_table(const std::filesystem::path& path);
