@@ -50,6 +50,8 @@ struct FeatureFrame {
   Feature z, x, origin;
   /// The origin moves by this along x, y, z: sticker thickness, distance from a plane to the end plate.
   Eigen::Vector3d offset_mm = Eigen::Vector3d::Zero();
+  /// Markers farther from their feature are left out; 0: the least that most of them keep, up to 0.5 mm.
+  double tolerance_mm = 0;
 };
 
 /// How a body's frame (UG of the fixed body, LG of the moving one) is found.
@@ -63,6 +65,10 @@ struct FrameRule {
   double gd_mm = 0;                      ///< LG: distance O_LG to O_UG at home
   std::optional<FeatureFrame> features;  ///< From::features
 };
+
+/// Relative sigma of the scale of a print that nobody measured: a laser printer's feed and the moisture of
+/// the paper move it by about as much.
+inline constexpr double kPaperScaleSigma = 0.001;
 
 /// Where the campaign's scale comes from.
 enum class ScaleFrom { markers, bars, nominal };

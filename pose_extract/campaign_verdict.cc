@@ -11,6 +11,8 @@
 namespace hexcal {
 namespace {
 
+constexpr double kManyElsewhere = 0.3;  // of a grip's markers in one pose
+
 void suspect_all(CampaignResult& result, const std::string& words) {
   for (MeasuredPose& pose : result.poses) {
     if (pose.pose) suspect(pose, words);
@@ -75,6 +77,93 @@ void judge_markers(CampaignResult& result) {
   }
 }
 
+// Of the markers of a body that an epoch shows, those that stand elsewhere there; by epoch.
+std::vector<std::pair<int, int>> elsewhere_and_seen(const CampaignResult& result, int body) {
+  std::map<std::pair<std::size_t, int>, std::pair<int, int>> counts;  // (epoch, marker): used, rejected
+  for (const Sighting& sighting : result.adjusted.sightings) {
+    const auto photo = static_cast<std::size_t>(sighting.photo);
+    if (sighting.feature < 0 || result.photographs[photo].contradicts_pose) continue;
+    if (result.network.features[static_cast<std::size_t>(sighting.feature)].body != body) continue;
+    auto& [used, rejected] =
+        counts[{static_cast<std::size_t>(result.network.photos[photo].epoch), sighting.feature}];
+    if (sighting.status == SightingStatus::used) ++used;
+    if (sighting.status == SightingStatus::outlier) ++rejected;
+  }
+  std::vector<std::pair<int, int>> epochs(result.poses.size());
+  for (const auto& [key, count] : counts) {
+    if (count.first == 0 && count.second >= 2) ++epochs[key.first].first;
+    if (count.first + count.second > 0) ++epochs[key.first].second;
+  }
+  return epochs;
+}
+
+// Poses in which so many markers of a body stand otherwise than in the others that these may be the wrong
+// ones.
+std::vector<char> judge_shifted_grips(int body, CampaignResult& result) {
+  std::vector<char> shifted(result.poses.size(), 0);
+  const auto epochs = elsewhere_and_seen(result, body);
+  for (std::size_t e = 0; e < epochs.size(); ++e) {
+    const auto& [elsewhere, seen] = epochs[e];
+    if (elsewhere < 2 || elsewhere < kManyElsewhere * seen) continue;
+    shifted[e] = 1;
+    suspect(result.poses[e], fmt::format("{} of {} {} markers stand otherwise than in the other poses",
+                                         elsewhere, seen, body == kReferenceBody ? "fixed" : "moving"));
+  }
+  return shifted;
+}
+
+// So many markers of a body moved that the others may be those that did.
+void judge_moved_body(const MarkerSlip& last, CampaignResult& result) {
+  const int body = result.network.features[static_cast<std::size_t>(last.feature)].body;
+  const std::vector<char> shifted = judge_shifted_grips(body, result);
+  // The first pose after which anything of the kind is seen.
+  std::size_t first = result.order.size();
+  double moved_mm = last.moved_mm;
+  for (const MarkerSlip& slip : result.slips) {
+    if (result.network.features[static_cast<std::size_t>(slip.feature)].body != body) continue;
+    const auto at = std::find(result.order.begin(), result.order.end(), slip.after) - result.order.begin();
+    first = std::min(first, static_cast<std::size_t>(at));
+    moved_mm = std::max(moved_mm, slip.moved_mm);
+  }
+  for (std::size_t i = first; i-- > 1;) {
+    if (shifted[result.order[i]]) first = i;
+  }
+  const std::string words = fmt::format(
+      "the {} markers moved between {} and {} by {:.2g} mm", body == kReferenceBody ? "fixed" : "moving",
+      result.poses[result.order[first - 1]].id, result.poses[result.order[first]].id, moved_mm);
+  result.findings.emplace_back(
+      words,
+      fmt::format("fasten the markers and the grip, and take the poses from {} on again",
+                  result.poses[result.order[first]].id),
+      Severity::bad);
+  for (std::size_t i = first; i < result.order.size(); ++i) {
+    if (result.poses[result.order[i]].pose) suspect(result.poses[result.order[i]], words);
+  }
+}
+
+void judge_slips(CampaignResult& result) {
+  std::set<int> moved_bodies;
+  for (const MarkerSlip& slip : result.slips) {
+    if (!slip.many) continue;
+    moved_bodies.insert(result.network.features[static_cast<std::size_t>(slip.feature)].body);
+    judge_moved_body(slip, result);
+  }
+  for (const int body : {kReferenceBody, kMovingBody}) {
+    if (moved_bodies.count(body) == 0) (void)judge_shifted_grips(body, result);
+  }
+  for (const MarkerSlip& slip : result.slips) {
+    const NetworkFeature& marker = result.network.features[static_cast<std::size_t>(slip.feature)];
+    if (moved_bodies.count(marker.body) != 0) continue;
+    result.findings.emplace_back(
+        fmt::format(
+            "marker {} of the {} grip moved by {:.2g} mm between {} and {}; what it shows {} is left out",
+            marker.id, marker.body == kReferenceBody ? "fixed" : "moving", slip.moved_mm,
+            result.poses[slip.before].id, result.poses[slip.after].id,
+            slip.after_is_kept ? "before" : "from then on"),
+        fmt::format("fasten marker {}", marker.id));
+  }
+}
+
 void judge_residuals(CampaignResult& result) {
   const double sigma0 = result.adjusted.sigma0;
   if (sigma0 > kSuspectSigma0) {
@@ -111,8 +200,9 @@ void judge_length(const char* kind, const MeasuredLength& length, CampaignResult
   const bool contradicts = sigmas > kContradictionSigmas;
   result.findings.emplace_back(
       fmt::format(
-          "{}: measured {:.4f} mm, stated {:.4f} mm, {:.1f} sigma apart: it disagrees with the scale used",
-          name, length.length_mm, length.known.length_mm, sigmas),
+          "{}: measured {:.4f} mm, stated {:.4f} mm, {:.1f} sigma apart: it disagrees with the scale used{}",
+          name, length.length_mm, length.known.length_mm, sigmas,
+          unit_words(length.known.length_mm / length.length_mm)),
       fmt::format("measure the distance from marker {} to {} again; if it stands, the markers' sizes in "
                   "campaign.yaml are wrong or one of the two moved",
                   length.known.a.id, length.known.b.id),
@@ -139,6 +229,7 @@ void judge_datum(const char* name, const DatumFrame& frame, CampaignResult& resu
 void judge_campaign(const Campaign& campaign, CampaignResult& result) {
   judge_failed_poses(result);
   judge_markers(result);
+  judge_slips(result);
   judge_residuals(result);
   // A single bar that gives the scale agrees with itself.
   if (campaign.scale != ScaleFrom::bars || result.bars.size() > 1) {
@@ -150,6 +241,7 @@ void judge_campaign(const Campaign& campaign, CampaignResult& result) {
     }
   }
   for (const MeasuredLength& check : result.checks) judge_length("check", check, result);
+  judge_scale(campaign, result);
   judge_datum("UG", result.UG, result);
   judge_datum("LG", result.LG, result);
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "kinematics/geometry/covariance.h"
 #include "pose_extract/datum_frame.h"
@@ -13,8 +14,10 @@ namespace {
 
 constexpr double kFewestToleranceMm = 0.02;  // of a point from its feature; printed stickers are no flatter
 constexpr double kToleranceSigmas = 6;
-constexpr double kDifferenceMm = 1e-4;  // step of the derivatives
-constexpr double kSteepestDeg = 10;     // least angle between z and x
+constexpr double kMostToleranceMm = 0.5;  // without a stated one; stickers and machined faces are no rougher
+constexpr double kMajority = 0.7;         // of the markers, that a tolerance of its own must hold
+constexpr double kDifferenceMm = 1e-4;    // step of the derivatives
+constexpr double kSteepestDeg = 10;       // least angle between z and x
 
 // The measured points of one feature.
 struct FeaturePoints {
@@ -79,6 +82,42 @@ FeaturePoints gather(const Network& network, const AdjustmentResult& adjusted, i
   return out;
 }
 
+const char* kind_name(Feature::Kind kind) {
+  switch (kind) {
+    case Feature::Kind::plane:
+      return "plane";
+    case Feature::Kind::line:
+      return "line";
+    case Feature::Kind::circle:
+      return "circle";
+    case Feature::Kind::sphere:
+      return "sphere";
+    case Feature::Kind::cylinder:
+      return "cylinder";
+    case Feature::Kind::point:
+      break;
+  }
+  return "point";
+}
+
+// Numbers of a feature that its markers' distances set.
+double free_numbers(Feature::Kind kind) {
+  switch (kind) {
+    case Feature::Kind::plane:
+      return 3;
+    case Feature::Kind::line:
+      return 2;
+    case Feature::Kind::circle:
+    case Feature::Kind::sphere:
+      return 4;
+    case Feature::Kind::cylinder:
+      return 5;
+    case Feature::Kind::point:
+      break;
+  }
+  return 0;
+}
+
 FittedFeature fit(const FeaturePoints& points) {
   FittedFeature fitted =
       fit_feature(points.kind, points.points, points.sigma_mm, points.normals, points.centres, points.used);
@@ -107,9 +146,17 @@ std::map<int, double> marker_distances(const FeaturePoints& points, const Fitted
   return means;
 }
 
-// Whole markers that do not lie on the feature: first the consensus, then the residuals of the fit.
-void choose_points(FeaturePoints& points) {
-  const double tolerance = std::max(kFewestToleranceMm, kToleranceSigmas * points.sigma_mm.mean());
+std::size_t count_markers(const FeaturePoints& points, bool used_only) {
+  std::set<int> ids;
+  for (std::size_t i = 0; i < points.names.size(); ++i) {
+    if (!used_only || points.used[i]) ids.insert(points.names[i].id);
+  }
+  return ids.size();
+}
+
+// Whole markers that do not lie on the feature within the tolerance: first the consensus, then the residuals
+// of the fit.
+void choose_within(FeaturePoints& points, double tolerance) {
   points.used = consensus_points(points.kind, points.points, tolerance);
   // A sticker lifts as a whole: a marker most of whose corners are out is out.
   std::map<int, std::pair<int, int>> per_marker;
@@ -138,6 +185,45 @@ void choose_points(FeaturePoints& points) {
     if (id < 0) return;
     for (std::size_t i = 0; i < points.names.size(); ++i) points.used[i] &= points.names[i].id != id;
   }
+}
+
+// By the tolerance stated, or by the least that most markers keep. The reason why too few do, or nothing.
+std::string choose_points(FeaturePoints& points, double stated_mm) {
+  const auto all = static_cast<double>(count_markers(points, false));
+  double tolerance =
+      stated_mm > 0 ? stated_mm : std::max(kFewestToleranceMm, kToleranceSigmas * points.sigma_mm.mean());
+  choose_within(points, tolerance);
+  const double most = std::max(kMostToleranceMm, tolerance);
+  while (!(stated_mm > 0) && tolerance < most &&
+         static_cast<double>(count_markers(points, true)) < kMajority * all) {
+    tolerance = std::min(most, 1.5 * tolerance);
+    choose_within(points, tolerance);
+  }
+  const std::size_t used = count_markers(points, true);
+  if (2 * static_cast<double>(used) > all) return "";
+  return fmt::format("only {} of its {:.0f} markers lie on one {} within {:.2g} mm", used, all,
+                     kind_name(points.kind), tolerance);
+}
+
+// Covariance of the distance of a marker from the feature, beyond the noise: what the used ones scatter, with
+// Student's factor. Zero where they do not scatter or leave nothing to tell it.
+double form_variance(const FeaturePoints& points) {
+  const FittedFeature fitted = fit(points);
+  if (!fitted.ok || points.kind == Feature::Kind::point) return 0;
+  const std::map<int, double> distances = marker_distances(points, fitted);
+  double squares = 0;
+  double count = 0;
+  for (const auto& [id, distance] : distances) {
+    for (std::size_t i = 0; i < points.names.size(); ++i) {
+      if (points.names[i].id != id || !points.used[i]) continue;
+      squares += distance * distance;
+      count += 1;
+      break;
+    }
+  }
+  const double freedom = count - free_numbers(points.kind);
+  if (!(freedom > 0)) return 0;
+  return squares / freedom * (freedom > 3 ? freedom / (freedom - 2) : 3);
 }
 
 struct FeatureSet {
@@ -238,7 +324,15 @@ DatumFrame frame_from_features(const Network& network, const AdjustmentResult& a
       frame.reason = "none of a feature's markers was measured";
       return frame;
     }
-    choose_points(*points);
+  }
+  for (const auto& [name, points] :
+       {std::pair{"z", &set.z}, std::pair{"x", &set.x}, std::pair{"origin", &set.origin}}) {
+    const std::string why = choose_points(*points, features.tolerance_mm);
+    if (why.empty()) continue;
+    frame.reason = fmt::format("its {} feature: {}", name, why);
+    frame.instruction =
+        "look for markers that are not on it or are lifted, and name others, or state tolerance_mm";
+    return frame;
   }
   const auto found = construct(set, features.offset_mm, frame.reason);
   if (!found) return frame;
@@ -246,6 +340,8 @@ DatumFrame frame_from_features(const Network& network, const AdjustmentResult& a
   frame.by_error = Eigen::Matrix<double, 7, Eigen::Dynamic>::Zero(7, adjusted.num_errors());
   // Derivatives of the frame by each point, through the fits, then by the errors of the adjustment.
   for (FeaturePoints* points : {&set.z, &set.x, &set.origin}) {
+    const double form = form_variance(*points);
+    std::map<int, Eigen::Matrix<double, 6, 3>> by_marker;
     for (Eigen::Index i = 0; i < points->points.cols(); ++i) {
       if (!points->used[static_cast<std::size_t>(i)]) continue;
       Eigen::Matrix<double, 6, 3> by_point;
@@ -264,7 +360,15 @@ DatumFrame frame_from_features(const Network& network, const AdjustmentResult& a
         by_point.col(c) = perturbation_between(*minus, *plus) / (2 * kDifferenceMm);
       }
       frame.by_error.topRows<6>() += by_point * points->by_error[static_cast<std::size_t>(i)];
+      auto& sum =
+          by_marker
+              .try_emplace(points->names[static_cast<std::size_t>(i)].id, Eigen::Matrix<double, 6, 3>::Zero())
+              .first->second;
+      sum += by_point;
     }
+    // A sticker stands off with all of its corners.
+    for (const auto& [id, by_all] : by_marker)
+      frame.own.topLeftCorner<6, 6>() += by_all * form * by_all.transpose();
   }
   report(set.z, "z", frame);
   report(set.x, "x", frame);

@@ -21,8 +21,6 @@ constexpr double kNarrowest = 0.01;  // least width over length of the points th
 // a hand.
 constexpr double kUnstatedSigmaMm = 0.01;
 constexpr std::size_t kFewStickers = 10;
-// Size of the markers over that of nominal coordinates: no printer is farther off, a wrong unit is.
-constexpr double kBeyondPrinter = 0.1;
 // With more of the points wrong than this, the rest is no more trusted.
 constexpr double kFewWrong = 1.0 / 3;
 
@@ -141,11 +139,12 @@ void remark_nominal(const std::vector<NominalSticker>& stickers, const NominalFi
     for (const NominalPoint& point : sticker.points) stated = stated && point.sigma_mm > 0;
     points += sticker.points.size();
   }
-  if (fit.placement.shift_mm > 0 && stated) {
+  const double off_mm = std::hypot(fit.placement.shift_mm, fit.point_mm);
+  if (off_mm > 0 && stated) {
     frame.notes.push_back(fmt::format(
         "its markers lie {:.2g} mm (1 sigma) off their nominal coordinates, more than the sigma_mm "
         "stated; the poses' sigmas hold it",
-        fit.placement.shift_mm));
+        off_mm));
   }
   const std::vector<std::string> left_out = words_of_left_out(stickers, fit);
   frame.notes.insert(frame.notes.end(), left_out.begin(), left_out.end());
@@ -223,7 +222,7 @@ DatumFrame frame_from_nominal(const Network& network, const AdjustmentResult& ad
   const Eigen::Matrix3d rotation = fit.scale * fit.frame_from_body.rotation_matrix();
   for (std::size_t s = 0; s < stickers.size(); ++s) {
     const NominalSticker& sticker = stickers[s];
-    const Eigen::MatrixXd covariance = nominal_covariance(sticker, fit, fit.placement);
+    const Eigen::MatrixXd covariance = nominal_covariance(sticker, fit);
     frame.own += gains[s] * covariance * gains[s].transpose();
     for (std::size_t i = 0; i < sticker.points.size(); ++i) {
       const auto at = static_cast<Eigen::Index>(i);

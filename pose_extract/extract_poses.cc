@@ -12,6 +12,7 @@
 #include "kinematics/geometry/input_error.h"
 #include "kinematics/geometry/nearest_name.h"
 #include "photogrammetry/adjustment/marker_map.h"
+#include "pose_extract/marker_slips.h"
 #include "pose_extract/photograph_screening.h"
 #include "pose_extract/pose_verdict.h"
 
@@ -70,6 +71,8 @@ bool seen_twice(const Network& network, int marker) {
 
 // Without a single measured bar the scale would be open: the markers' sizes have to do, said aloud.
 void choose_scale(const Campaign& campaign, CampaignResult& result, AdjustmentOptions& options) {
+  // Beside another source they are compared with it.
+  if (campaign.scale != ScaleFrom::bars) result.network.lengths.clear();
   std::erase_if(result.network.lengths, [&](const NetworkLength& length) {
     return !seen_twice(result.network, length.feature_a) || !seen_twice(result.network, length.feature_b);
   });
@@ -107,33 +110,6 @@ std::vector<int> poses_of_map(const CampaignResult& result, int wanted) {
   const std::size_t count = std::min(n, static_cast<std::size_t>(wanted));
   for (std::size_t i = 0; i < count; ++i) chosen.push_back(with_photographs[i * n / count]);
   return chosen;
-}
-
-double scale_sigma(const DatumFrame& frame) {
-  return std::sqrt(frame.by_error.row(6).squaredNorm() + frame.own(6, 6));
-}
-
-// Stated sizes of the markers beside the source of the scale; empty if they agree.
-std::string print_scale_words(double larger, double sigma, const char* source) {
-  if (std::abs(larger) <= kScaleDisagreementSigmas * sigma) return "";
-  return fmt::format(
-      "the markers are printed {:.4f} % larger than their stated sizes (sigma {:.4f} %): the scale is that "
-      "of the {}",
-      larger * 100, sigma * 100, source);
-}
-
-// Nominal coordinates beside another source of scale: do they agree?
-void compare_nominal_scale(const CampaignResult& base, const std::optional<FrameRule>& rule, int body,
-                           const char* name, std::vector<Finding>& findings) {
-  if (!rule || rule->from != FrameRule::From::nominal) return;
-  const DatumFrame scaled = frame_from_nominal(base.network, base.adjusted, body, rule->nominal, true);
-  if (!scaled.ok) return;
-  const double sigma = scale_sigma(scaled);
-  if (std::abs(scaled.scale - 1) <= kScaleDisagreementSigmas * sigma) return;
-  findings.push_back(
-      fmt::format("{}'s nominal coordinates are {:.4f} % larger than measured (sigma {:.4f} %): they "
-                  "disagree with the scale used",
-                  name, (scaled.scale - 1) * 100, sigma * 100));
 }
 
 Rigid3 scaled_motion(const Rigid3& motion, double scale) {
@@ -352,10 +328,15 @@ CampaignResult extract_poses(const Campaign& campaign, const CampaignObservation
   result.network = make_network(campaign, observations, result.photographs);
   ExtractOptions chosen = options;
   choose_scale(campaign, result, chosen.adjustment);
-  result.adjusted =
-      options.map_poses > 0 && options.map_poses < result.network.num_epochs
-          ? adjust_network_by_map(result.network, poses_of_map(result, options.map_poses), chosen.adjustment)
-          : adjust_network(result.network, chosen.adjustment);
+  const auto adjust = [&] {
+    return options.map_poses > 0 && options.map_poses < result.network.num_epochs
+               ? adjust_network_by_map(result.network, poses_of_map(result, options.map_poses),
+                                       chosen.adjustment)
+               : adjust_network(result.network, chosen.adjustment);
+  };
+  result.order = photographing_order(observations);
+  result.adjusted = adjust();
+  result.slips = leave_out_slipped_markers(result.order, adjust, result.network, result.adjusted);
   if (chosen.adjustment.print_scale_free && !result.adjusted.print_scale()) {
     result.findings.emplace_back(
         "no scale bar could be used, for the markers at their ends are not in the network: the scale is that "
@@ -384,18 +365,6 @@ CampaignResult extract_poses(const Campaign& campaign, const CampaignObservation
       // The moving body's scale holds for both; its noise is small beside the datum's and stays with LG.
       result.UG.scale = result.LG.scale;
     }
-  }
-  std::string sizes;
-  const DatumFrame& scaled = by_ug ? result.UG : result.LG;
-  if (nominal_scale && scaled.ok) {
-    sizes = print_scale_words(scaled.scale - 1, scale_sigma(scaled), "nominal coordinates");
-  } else if (const auto print = result.adjusted.print_scale(); campaign.scale == ScaleFrom::bars && print) {
-    sizes = print_scale_words(print->value, print->sigma(), "bars");
-  }
-  if (!sizes.empty()) result.findings.push_back(sizes);
-  if (!nominal_scale) {
-    compare_nominal_scale(result, campaign.ug, kReferenceBody, "UG", result.findings);
-    compare_nominal_scale(result, campaign.lg, kMovingBody, "LG", result.findings);
   }
   if (from_home && result.UG.ok) {
     const auto home = static_cast<std::size_t>(result.home_epoch);

@@ -10,6 +10,7 @@
 #include "photogrammetry/markers/detect.h"
 #include "pose_extract/campaign.h"
 #include "pose_extract/datum_frame.h"
+#include "pose_extract/marker_slips.h"
 #include "pose_extract/pose_consistency.h"
 
 // From marker observations to the poses of the lower grip: the whole measurement of a campaign, without
@@ -130,6 +131,8 @@ struct CampaignResult {
   Network network;  ///< what was adjusted; photographs as in CampaignObservations
   AdjustmentResult adjusted;
   DatumFrame UG, LG;
+  std::vector<std::size_t> order;   ///< epochs as they were photographed: by capture times, or as listed
+  std::vector<MarkerSlip> slips;    ///< markers that did not keep their place on their body
   CampaignConsistency consistency;  ///< did the moving body stand still while a pose was photographed
   std::vector<MeasuredPose> poses;
   std::vector<MeasuredPhotograph> photographs;
@@ -160,6 +163,10 @@ struct CampaignResult {
 /// The pose that LG's rule calls home: the one of this name, or else the one that is meant by it (home for
 /// Home, one letter off). Throws InputError, with the way on, where there is none. Wants campaign.lg.
 [[nodiscard]] std::string find_home(const Campaign& campaign, const std::vector<std::string>& poses);
+
+/// The epochs in the order in which they were photographed: by their first capture time where all have one,
+/// or else as they are listed.
+[[nodiscard]] std::vector<std::size_t> photographing_order(const CampaignObservations& observations);
 
 /// Never throws for bad photographs: see the statuses. Throws InputError when options are invalid or the home
 /// pose is none of the poses.

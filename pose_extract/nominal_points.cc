@@ -65,7 +65,7 @@ Eigen::MatrixXd by_turn(const NominalSticker& sticker, const NominalFit& fit) {
 Eigen::MatrixXd weight_of(const NominalSticker& sticker, const NominalFit& fit) {
   const Eigen::Index m = sticker.in_body.cols();
   const Eigen::Matrix3d r = fit.scale * fit.frame_from_body.rotation_matrix();
-  Eigen::MatrixXd covariance = nominal_covariance(sticker, fit, fit.placement);
+  Eigen::MatrixXd covariance = nominal_covariance(sticker, fit);
   for (Eigen::Index a = 0; a < m; ++a) {
     for (Eigen::Index b = 0; b < m; ++b)
       covariance.block<3, 3>(3 * a, 3 * b) +=
@@ -166,13 +166,12 @@ std::optional<RobustMotion> robust_motion(const Eigen::Matrix3Xd& from, const Ei
   return best;
 }
 
-Eigen::MatrixXd nominal_covariance(const NominalSticker& sticker, const NominalFit& fit,
-                                   const Placement& placement) {
-  const Eigen::MatrixXd shift = placement.shift_mm * by_shift(sticker);
-  const Eigen::MatrixXd turn = placement.turn_rad * by_turn(sticker, fit);
+Eigen::MatrixXd nominal_covariance(const NominalSticker& sticker, const NominalFit& fit) {
+  const Eigen::MatrixXd shift = fit.placement.shift_mm * by_shift(sticker);
+  const Eigen::MatrixXd turn = fit.placement.turn_rad * by_turn(sticker, fit);
   Eigen::MatrixXd covariance = shift * shift.transpose() + turn * turn.transpose();
   for (std::size_t i = 0; i < sticker.points.size(); ++i) {
-    const double sigma = std::max(kLeastSigmaMm, sticker.points[i].sigma_mm);
+    const double sigma = std::hypot(std::max(kLeastSigmaMm, sticker.points[i].sigma_mm), fit.point_mm);
     covariance.diagonal().segment<3>(3 * static_cast<Eigen::Index>(i)).array() += sigma * sigma;
   }
   return covariance;
@@ -227,10 +226,13 @@ void fit_placement(const std::vector<NominalSticker>& stickers, NominalFit& fit)
   // From what is left, and from a turn that moves corners as much.
   fit.placement.shift_mm = std::max(1e-4, std::sqrt(squares / static_cast<double>(count)));
   fit.placement.turn_rad = turns ? std::max(1e-6, fit.placement.shift_mm / 20) : 0;
-  double freedom_shift = 0, freedom_turn = 0;
+  // Single points show beside others of their sticker only.
+  fit.point_mm = turns ? fit.placement.shift_mm / 3 : 0;
+  double freedom_shift = 0, freedom_turn = 0, freedom_point = 0;
   for (int i = 0; i < kPlacementIterations; ++i) {
     for (int k = 0; k < 3; ++k) (void)improve_fit(stickers, fit);
-    double squares_shift = 0, squares_turn = 0, trace_shift = 0, trace_turn = 0;
+    double squares_shift = 0, squares_turn = 0, squares_point = 0;
+    double trace_shift = 0, trace_turn = 0, trace_point = 0;
     for (const NominalSticker& sticker : stickers) {
       if (!sticker.any_used()) continue;
       const Matrix3X7d j = jacobian_of(sticker, fit);
@@ -241,11 +243,15 @@ void fit_placement(const std::vector<NominalSticker>& stickers, NominalFit& fit)
       const Eigen::MatrixXd turn = by_turn(sticker, fit);
       squares_shift += (shift.transpose() * along).squaredNorm();
       squares_turn += (turn.transpose() * along).squaredNorm();
+      squares_point += along.squaredNorm();
+      trace_point += projected.trace();
       trace_shift += (shift.transpose() * projected * shift).trace();
       trace_turn += (turn.transpose() * projected * turn).trace();
     }
     freedom_shift = trace_shift * fit.placement.shift_mm * fit.placement.shift_mm;
     freedom_turn = trace_turn * fit.placement.turn_rad * fit.placement.turn_rad;
+    freedom_point = trace_point * fit.point_mm * fit.point_mm;
+    if (freedom_point > 1e-9) fit.point_mm *= std::pow(squares_point / trace_point, 0.25);
     if (freedom_shift > 1e-9) fit.placement.shift_mm *= std::pow(squares_shift / trace_shift, 0.25);
     if (freedom_turn > 1e-9) fit.placement.turn_rad *= std::pow(squares_turn / trace_turn, 0.25);
   }
@@ -256,6 +262,7 @@ void fit_placement(const std::vector<NominalSticker>& stickers, NominalFit& fit)
   };
   fit.placement.shift_mm *= student(freedom_shift);
   fit.placement.turn_rad *= student(freedom_turn);
+  fit.point_mm *= student(freedom_point);
   if (!stated && count < kFewestTelling) {
     fit.placement.shift_mm = std::max(fit.placement.shift_mm, kHandPlacement.shift_mm);
     if (turns) fit.placement.turn_rad = std::max(fit.placement.turn_rad, kHandPlacement.turn_rad);

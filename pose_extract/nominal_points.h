@@ -58,6 +58,7 @@ struct NominalFit {
   double scale = 1;
   bool with_scale = false;
   Placement placement;
+  double point_mm = 0;  ///< by which each point is off by itself, per axis: rounded tables, the print
   Matrix7d covariance = Matrix7d::Zero();  ///< of the perturbation; without scale its last row is zero
   double chi2 = 0;
   int redundancy = 0;
@@ -69,12 +70,11 @@ double improve_fit(const std::vector<NominalSticker>& stickers, NominalFit& fit,
                    std::vector<Eigen::MatrixXd>* gains = nullptr);
 
 /// Covariance of a sticker's nominal coordinates, 3m x 3m: what they state and its placement.
-[[nodiscard]] Eigen::MatrixXd nominal_covariance(const NominalSticker& sticker, const NominalFit& fit,
-                                                 const Placement& placement);
+[[nodiscard]] Eigen::MatrixXd nominal_covariance(const NominalSticker& sticker, const NominalFit& fit);
 
-/// Variance components of the placement by restricted maximum likelihood (Patterson and Thompson 1971;
-/// iteration of Foerstner 1979), with the factor by which few stickers tell their own scatter badly. Where
-/// sigmas are stated, zero unless the residuals contradict them.
+/// Variance components of the placement, and of single points, by restricted maximum likelihood (Patterson
+/// and Thompson 1971; iteration of Foerstner 1979), with the factor by which few stickers tell their own
+/// scatter badly. Where sigmas are stated, zero unless the residuals contradict them.
 void fit_placement(const std::vector<NominalSticker>& stickers, NominalFit& fit);
 
 }  // namespace hexcal

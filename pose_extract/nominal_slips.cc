@@ -320,6 +320,10 @@ std::optional<NominalSlip> find_slip(const Network& network, const AdjustmentRes
   }
   Hypothesis scaled;
   scaled.with_scale = true;
+  const HypothesisFit free = fit_hypothesis(measured, nominal, scaled);
+  // What a printer does to the scale is for judge_scale() to say.
+  const bool printed = free.motion && std::abs(std::log(free.motion->scale)) < kBeyondPrinter;
+  if (printed && as_listed_mm <= limit_mm) return search.result();
   if (const auto motion = search.better(scaled)) {
     search.found().words = fmt::format("{:.4g} times as large as the markers' size_mm say", motion->scale);
     search.found().instruction =
@@ -339,7 +343,8 @@ std::vector<std::string> words_of_left_out(const std::vector<NominalSticker>& st
   std::vector<std::string> words;
   std::vector<StickerPlace> out;
   // A left-out sticker that fits elsewhere does so as the others fit.
-  const double limit_mm = std::max(0.5, 5 * std::hypot(fit.placement.shift_mm, 17 * fit.placement.turn_rad));
+  const double limit_mm =
+      std::max(0.5, 5 * std::hypot(fit.placement.shift_mm, 17 * fit.placement.turn_rad, fit.point_mm));
   for (const NominalSticker& sticker : stickers) {
     if (!sticker.any_used()) out.push_back(place_in_frame(sticker, fit));
   }

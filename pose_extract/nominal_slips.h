@@ -14,6 +14,9 @@ namespace hexcal {
 /// 0.5 mm, and half of them four times as far off is another cause. Rougher coordinates state their sigma_mm.
 inline constexpr double kBeyondHandMm = 2;
 
+/// Coordinates and the markers' size_mm that differ by more are of two units or things, no print.
+inline constexpr double kBeyondPrinter = 0.1;
+
 /// A slip under which the coordinates fit.
 struct NominalSlip {
   std::string words;        ///< what the coordinates are: "mirrored: x and y are exchanged"

@@ -9,6 +9,38 @@
 namespace hexcal {
 namespace {
 
+// Of what two photographs differ by if each has noise of its own; copies, saved again, differ by far less.
+constexpr double kCopyShare = 0.25;
+constexpr std::size_t kFewestShared = 3;  // markers
+
+// Do both show the same markers at the same places, `turned` by 180 deg or not, nearer than noise can be?
+bool shows_the_same(const PhotographObservations& a, const PhotographObservations& b, bool turned) {
+  if (a.info.width_px != b.info.width_px || a.info.height_px != b.info.height_px) return false;
+  std::map<int, const MarkerObservation*> in_b;
+  for (const MarkerObservation& marker : b.markers) {
+    if (marker.status == MarkerStatus::ok) in_b[marker.id] = &marker;
+  }
+  double squares = 0;
+  double expected = 0;
+  std::size_t shared = 0;
+  std::size_t of_a = 0;
+  for (const MarkerObservation& marker : a.markers) {
+    if (marker.status != MarkerStatus::ok) continue;
+    ++of_a;
+    const auto other = in_b.find(marker.id);
+    if (other == in_b.end()) continue;
+    ++shared;
+    for (std::size_t c = 0; c < 4; ++c) {
+      Eigen::Vector2d at = other->second->corners_px[c];
+      if (turned) at = Eigen::Vector2d(b.info.width_px - 1, b.info.height_px - 1) - at;
+      squares += (marker.corners_px[c] - at).squaredNorm();
+    }
+    expected += marker.covariance_px2.trace() + other->second->covariance_px2.trace();
+    if (squares > kCopyShare * expected + 1) return false;
+  }
+  return shared >= kFewestShared && 2 * shared > of_a && squares < kCopyShare * expected;
+}
+
 void screen_camera(const CampaignObservations& observations, const CampaignPhotograph& photograph,
                    MeasuredPhotograph& out) {
   if (photograph.camera < 0) {
@@ -44,6 +76,7 @@ std::vector<MeasuredPhotograph> screen_photographs(const Campaign& campaign,
     return (observations.photographs[a].pose == home) > (observations.photographs[b].pose == home);
   });
   std::map<std::string, std::size_t> first_with;
+  std::vector<std::size_t> counted;
   for (const std::size_t p : order) {
     const CampaignPhotograph& photograph = observations.photographs[p];
     if (photograph.seen.status != PhotographStatus::ok) {
@@ -61,6 +94,17 @@ std::vector<MeasuredPhotograph> screen_photographs(const Campaign& campaign,
         continue;
       }
     }
+    for (const std::size_t earlier : counted) {
+      const CampaignPhotograph& other = observations.photographs[earlier];
+      const bool turned = shows_the_same(other.seen, photograph.seen, true);
+      if (!turned && !shows_the_same(other.seen, photograph.seen, false)) continue;
+      out[p].status = PhotoStatus::duplicate;
+      out[p].words = fmt::format("a copy of {} of pose {}{}", other.seen.name, other.pose,
+                                 turned ? ", turned by 180 deg" : ", saved again");
+      break;
+    }
+    if (out[p].status == PhotoStatus::duplicate) continue;
+    counted.push_back(p);
     screen_camera(observations, photograph, out[p]);
   }
   return out;

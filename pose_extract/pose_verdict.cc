@@ -121,7 +121,7 @@ void judge_pose(const ExtractOptions& options, const EpochEvidence& evidence, st
       pose.status = PoseStatus::disconnected;
       add_words(pose.words,
                 "its markers of the moving grip fit no other pose: photographs of several poses, "
-                "markers that moved, or markers that no other pose shows");
+                "markers that moved or have another size_mm, or markers that no other pose shows");
       return;
     }
     pose.status = connected ? PoseStatus::no_moving_markers : PoseStatus::disconnected;

@@ -44,9 +44,20 @@ void judge_poses(const CampaignObservations& observations, const ExtractOptions&
 /// camera that is not as calibrated.
 void judge_campaign(const Campaign& campaign, CampaignResult& result);
 
+/// Findings about the sources of the scale (sizes, bars, check distances, nominal coordinates) that
+/// contradict each other; the poses are suspect unless a third source knows better.
+void judge_scale(const Campaign& campaign, CampaignResult& result);
+
+/// " (a factor of 25.4: inch for mm?)" for a ratio of lengths that is a unit's; else empty.
+[[nodiscard]] std::string unit_words(double times);
+
 /// Findings from the commanded poses by id: misspelt ids; frames that are turned against each other; poses
 /// that lie where another was to be, as after two folders' names were swapped, which become suspect.
 void judge_against_targets(const std::map<std::string, Pose>& commanded, CampaignResult& result);
+
+/// A step in mid-campaign of what the measured poses differ by from the commanded ones (as a smooth function
+/// of the pose otherwise): a grip, or the base, moved. Poses after it are suspect.
+void judge_target_steps(const std::map<std::string, Pose>& commanded, CampaignResult& result);
 
 /// The worst of all findings and statuses: good means that every pose and photograph is ok. In a campaign
 /// without a moving body folders are no poses and do not count.

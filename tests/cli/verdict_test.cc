@@ -144,6 +144,34 @@ TEST_F(Verdicts, ACheckDistanceThatIsFarOffIsAProblem) {
   EXPECT_THAT(reported.out, AllOf(HasSubstr("Not usable"), Not(HasSubstr(kSend))));
 }
 
+TEST_F(Verdicts, SlipsOfDatumAndScaleAreNamedAndNoPoseIsOk) {
+  struct Slip {
+    const char *file, *from, *to, *words, *status;
+  };
+  const char* scale = "scale: {from: markers, print_scale_sigma: 0}";
+  for (const Slip& slip :
+       {Slip{"markers_nominal.csv", "x_mm,y_mm,z_mm", "x_mm,z_mm,y_mm",
+             "problem: UG: its nominal coordinates are mirrored: y and z are exchanged", "no_datum"},
+        Slip{"campaign.yaml", "size_mm: 24", "size_mm: 0.024", "the markers' size_mm in m", "no_datum"},
+        Slip{"campaign.yaml", "ids: [0-9]", "ids: [10-19]", "no fixed marker connects it", ""},
+        Slip{"campaign.yaml", scale, "scale: {bars: [{a: 0.0, b: 0.1, length_mm: 23.7, sigma_mm: 0.01}]}",
+             "UG's nominal coordinates are 1.26", "suspect"},
+        Slip{"campaign.yaml", "{from: nominal, file: markers_nominal.csv}",
+             "{from: features, z: {plane: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]}, x: {line: [0, 4]}, origin: "
+             "{point: 0}}",
+             "markers lie on one plane within 0.5 mm", "no_datum"}}) {
+    const std::string before = contents(lab_ / slip.file);
+    write(lab_ / slip.file, replaced_all(before, slip.from, slip.to));
+    const CommandResult result = measure(observations_);
+    EXPECT_EQ(result.exit_code, 1) << slip.to << result.err;
+    EXPECT_THAT(result.out, HasSubstr(slip.words));
+    for (const char* id : {"p001", "p005"})
+      EXPECT_THAT(poses()[id].status, HasSubstr(slip.status)) << slip.to;
+    for (const auto& [id, pose] : poses()) EXPECT_TRUE(id == "home" || pose.status != "ok") << id << slip.to;
+    write(lab_ / slip.file, before);
+  }
+}
+
 TEST_F(Verdicts, ExchangedFoldersAreToBeExchangedAndNothingIsSent) {
   std::string observations = replaced_all(observations_, "p002/", "pXXX/");
   observations = replaced_all(replaced_all(observations, "p003/", "p002/"), "pXXX/", "p003/");

@@ -171,6 +171,43 @@ TEST(DatumFeatures, SayWhichFeatureIsTooWeakForAFrame) {
   expect("its features are too weak to construct it", [](auto& f) { f.x.points = {{13, -1}, {0, -1}}; });
 }
 
+// Markers 12 to 17 lie on the end plate, the others on the sides; `off_mm` is how far each stands off the
+// plate.
+DatumFrame frame_of_plate(const std::vector<double>& off_mm, double tolerance_mm) {
+  ObservationScene scene = twelve_sided_grip({});
+  AdjustmentResult adjusted = adjust_network(scene.network, {});
+  for (std::size_t i = 0; i < off_mm.size(); ++i) {
+    Rigid3& marker = adjusted.geometry.body_from_feature[12 + i];
+    marker.translation += marker.rotation * Eigen::Vector3d(0, 0, off_mm[i]);
+  }
+  FeatureFrame features;
+  features.z = feature(Feature::Kind::plane, 12, 17);
+  features.x = feature(Feature::Kind::line, 12, 13);
+  features.origin = feature(Feature::Kind::point, 12, 12);
+  features.tolerance_mm = tolerance_mm;
+  return frame_from_features(scene.network, adjusted, kReferenceBody, features);
+}
+
+TEST(DatumFeatures, MostMarkersMustLieOnAFeatureAndTheirScatterIsInTheSigma) {
+  const auto tilt_sigma = [](const DatumFrame& frame) {
+    const Eigen::Matrix<double, 7, 7> covariance = frame.by_error * frame.by_error.transpose() + frame.own;
+    return std::sqrt(covariance(3, 3) + covariance(4, 4));
+  };
+  const DatumFrame flat = frame_of_plate({0, 0, 0, 0, 0, 0}, 0);
+  ASSERT_TRUE(flat.ok) << flat.reason;
+  const DatumFrame thick = frame_of_plate({0.05, -0.06, 0.04, -0.07, 0.08, -0.03}, 0);
+  ASSERT_TRUE(thick.ok) << thick.reason;
+  // 0.06 mm on 35 mm.
+  EXPECT_GT(tilt_sigma(thick), 5 * tilt_sigma(flat));
+  EXPECT_GT(tilt_sigma(thick), 0.06 / 35 / std::sqrt(3.0));
+  const DatumFrame minority = frame_of_plate({0, 0, 0, 3, -4, 5}, 0);
+  EXPECT_FALSE(minority.ok);
+  EXPECT_THAT(minority.reason,
+              HasSubstr("its z feature: only 3 of its 6 markers lie on one plane within 0.5 mm"));
+  EXPECT_TRUE(frame_of_plate({0, 0, 0, 3, -4, 5}, 6).ok);
+  EXPECT_FALSE(frame_of_plate({0.05, -0.06, 0.04, -0.07, 0.08, -0.03}, 0.01).ok);
+}
+
 TEST(FeatureFit, WithoutASolutionSaysSo) {
   Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Random(3, 8);
   points(0, 3) = std::numeric_limits<double>::quiet_NaN();

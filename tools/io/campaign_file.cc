@@ -127,7 +127,8 @@ FrameRule read_frame(const YamlMap& frames, const std::string& name, const std::
   } else {
     rule.from = FrameRule::From::features;
     rule.features = FeatureFrame{read_feature(map, "z"), read_feature(map, "x"), read_feature(map, "origin"),
-                                 Eigen::Vector3d::Zero()};
+                                 Eigen::Vector3d::Zero(), 0};
+    if (map.has("tolerance_mm")) rule.features->tolerance_mm = positive(map, "tolerance_mm");
     if (map.has("offset_mm")) rule.features->offset_mm = map.vector3("offset_mm");
   }
   if (name == "LG") {
@@ -150,7 +151,9 @@ void read_scale(const YamlMap& top, Campaign& campaign) {
   if (campaign.scale == ScaleFrom::bars && campaign.bars.empty())
     map.fail("bars", "missing, wanted at least one");
   if (campaign.scale == ScaleFrom::markers) {
-    campaign.print_scale_sigma = not_negative(map, "print_scale_sigma", 0.0);
+    campaign.print_scale_sigma = not_negative(map, "print_scale_sigma", kPaperScaleSigma);
+  } else if (campaign.scale == ScaleFrom::bars) {
+    campaign.print_scale_sigma = kPaperScaleSigma;  // should no bar be in a photograph
   }
   for (const KnownLength& bar : campaign.bars) {
     if (!(bar.sigma_mm > 0)) map.fail("bars", "sigma_mm is missing or 0, wanted how well each bar is known");

@@ -22,8 +22,9 @@ namespace hexcal {
 ///                           {from: markers} (UG only: no coordinates, see frame_from_markers),
 ///                           {from: home, pose, gd_mm} (LG only), or
 ///                           {from: features, z: {plane: [..]}, x: {line: [..]}, origin: {circle: [..]},
-///                            offset_mm: [0, 0, 0]}
-///   scale                   {from: markers, print_scale_sigma: 0.001}, {from: nominal}, or
+///                            offset_mm: [0, 0, 0], tolerance_mm}
+///   scale                   {from: markers, print_scale_sigma: 0.001} (the default; less where the print's
+///                           edges were measured), {from: nominal}, or
 ///                           {from: bars, bars: [{a: 0.1, b: 9.2, length_mm, sigma_mm}]};
 ///                           bars beside another source are compared with it
 ///   checks                  [{a: 0, b: 5, length_mm: 182.41, sigma_mm: 0.01}]: compared, never used

@@ -31,7 +31,9 @@ std::string campaign_text(const VirtualLaboratory& laboratory) {
       "camera: camera.yaml\nhexapod: hexapod.yaml\ntargets: targets.csv\nlegs: legs.csv\nimages: poses\n"
       "markers:\n  family: {}\n  fixed:  {{ids: {}, size_mm: {}}}\n  moving: {{ids: {}, size_mm: {}}}\n"
       "frames:\n  UG: {{from: nominal, file: markers_nominal.csv}}\n"
-      "  LG: {{from: home, pose: home, gd_mm: {}}}\nscale: {{from: markers}}\n",
+      "  LG: {{from: home, pose: home, gd_mm: {}}}\n"
+      "# The virtual printer is exact; of paper that nobody measured the default is 0.001.\n"
+      "scale: {{from: markers, print_scale_sigma: 0}}\n",
       markers.family, ids(markers.first_fixed_id), markers.size_mm, ids(markers.first_moving_id),
       markers.size_mm, laboratory.machine.nominal.gd_mm);
 }
