@@ -61,10 +61,15 @@ const CrossValidation* doing_nothing(const CalibrationReport& calibration) {
   return nullptr;
 }
 
+// Where not all coordinates were measured, by the errors predicted over all six.
 bool beats(const CrossValidation& method, const CrossValidation& nothing) {
+  const auto errors = [](const CrossValidation& m) {
+    return m.predicted ? *m.predicted
+                       : PredictedOverAll{m.errors.position_rms_mm, m.errors.orientation_rms_rad};
+  };
   return method.method != CompensationMethod::nominal &&
-         method.errors.position_rms_mm < nothing.errors.position_rms_mm &&
-         method.errors.orientation_rms_rad < kOrientationAllowance * nothing.errors.orientation_rms_rad;
+         errors(method).position_mm < errors(nothing).position_mm &&
+         errors(method).orientation_rad < kOrientationAllowance * errors(nothing).orientation_rad;
 }
 
 // What measuring alone says.

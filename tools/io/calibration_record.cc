@@ -26,9 +26,14 @@ double number_of(const RecordJson& json) {
 
 RecordJson vector_json(const Vector6d& v) { return std::vector<double>(v.begin(), v.end()); }
 
+// What was not measured is no number: null too, but never where there may be infinity.
+double measured_of(const RecordJson& json) {
+  return json.is_null() ? std::numeric_limits<double>::quiet_NaN() : json.get<double>();
+}
+
 Vector6d vector_of(const RecordJson& json) {
   Vector6d v;
-  for (Eigen::Index i = 0; i < 6; ++i) v[i] = json.at(static_cast<std::size_t>(i)).get<double>();
+  for (Eigen::Index i = 0; i < 6; ++i) v[i] = measured_of(json.at(static_cast<std::size_t>(i)));
   return v;
 }
 
@@ -47,15 +52,15 @@ ErrorStatistics errors_of(const RecordJson& json) {
   ErrorStatistics e;
   e.poses = json.at("poses").get<int>();
   e.range = vector_of(json.at("range"));
-  e.position_magnitude_mm = json.at("magnitudes").at(0).get<double>();
-  e.orientation_magnitude_rad = json.at("magnitudes").at(1).get<double>();
+  e.position_magnitude_mm = measured_of(json.at("magnitudes").at(0));
+  e.orientation_magnitude_rad = measured_of(json.at("magnitudes").at(1));
   e.mean = vector_of(json.at("mean"));
   e.rms = vector_of(json.at("rms"));
   e.max_abs = vector_of(json.at("max_abs"));
-  e.position_rms_mm = json.at("position_mm").at(0).get<double>();
-  e.position_max_mm = json.at("position_mm").at(1).get<double>();
-  e.orientation_rms_rad = json.at("orientation_rad").at(0).get<double>();
-  e.orientation_max_rad = json.at("orientation_rad").at(1).get<double>();
+  e.position_rms_mm = measured_of(json.at("position_mm").at(0));
+  e.position_max_mm = measured_of(json.at("position_mm").at(1));
+  e.orientation_rms_rad = measured_of(json.at("orientation_rad").at(0));
+  e.orientation_max_rad = measured_of(json.at("orientation_rad").at(1));
   return e;
 }
 
@@ -63,7 +68,10 @@ RecordJson method_json(const CrossValidation& method) {
   RecordJson pairs = RecordJson::array();
   for (const PosePair& pair : method.held_out)
     pairs.push_back({vector_json(pair.target.vector()), vector_json(pair.actual.vector())});
+  RecordJson predicted;
+  if (method.predicted) predicted = {method.predicted->position_mm, method.predicted->orientation_rad};
   return {{"name", method.name},
+          {"predicted", predicted},
           {"method", name(method.method)},
           {"complexity", method.complexity},
           {"failure", method.failure},
@@ -83,8 +91,10 @@ CrossValidation method_of(const RecordJson& json) {
   method.failure = json.at("failure").get<std::string>();
   method.poses = json.at("poses").get<int>();
   method.errors = errors_of(json.at("errors"));
-  method.position_rms_se_mm = json.at("standard_errors").at(0).get<double>();
-  method.orientation_rms_se_rad = json.at("standard_errors").at(1).get<double>();
+  method.position_rms_se_mm = measured_of(json.at("standard_errors").at(0));
+  method.orientation_rms_se_rad = measured_of(json.at("standard_errors").at(1));
+  if (const RecordJson& predicted = json.at("predicted"); !predicted.is_null())
+    method.predicted = PredictedOverAll{predicted.at(0).get<double>(), predicted.at(1).get<double>()};
   method.targets_lost = json.at("targets_lost").get<int>();
   for (const RecordJson& pair : json.at("held_out")) {
     method.held_out.push_back(
