@@ -59,6 +59,10 @@ void judge_against_targets(const std::map<std::string, Pose>& commanded, Campaig
 /// of the pose otherwise): a grip, or the base, moved. Poses after it are suspect.
 void judge_target_steps(const std::map<std::string, Pose>& commanded, CampaignResult& result);
 
+/// Poses that turn about another point than the commanded ones, by far: another gd_mm or origin. They are
+/// suspect; true if so.
+bool judge_origin(const std::map<std::string, Pose>& commanded, CampaignResult& result);
+
 /// The worst of all findings and statuses: good means that every pose and photograph is ok. In a campaign
 /// without a moving body folders are no poses and do not count.
 [[nodiscard]] Severity overall_verdict(const CampaignResult& result);

@@ -15,6 +15,11 @@ constexpr int kFewestStepFreedom = 8;
 constexpr double kStepShare = 0.25;
 constexpr double kStepRatio = 12;
 
+// LG's origin is elsewhere in the targets: so far, and so many times better they fit then.
+constexpr double kLeastOriginMm = 10;
+constexpr double kOriginFitsBetter = 10;
+constexpr std::size_t kFewestForOrigin = 4;
+
 struct TargetError {
   std::size_t epoch;
   Pose commanded;
@@ -99,6 +104,34 @@ void judge_target_steps(const std::map<std::string, Pose>& commanded, CampaignRe
       Severity::bad);
   for (Eigen::Index i = at; i < n; ++i)
     suspect(result.poses[errors[static_cast<std::size_t>(i)].epoch], words);
+}
+
+bool judge_origin(const std::map<std::string, Pose>& commanded, CampaignResult& result) {
+  const std::vector<TargetError> errors = target_errors(commanded, result);
+  if (errors.size() < kFewestForOrigin) return false;
+  // A body that turns about another point than the one that the targets mean: error = (R - 1) c.
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  double before = 0;
+  for (const TargetError& at : errors) {
+    const Eigen::Matrix3d a = home_from_lg(at.commanded).rotation_matrix() - Eigen::Matrix3d::Identity();
+    normal += a.transpose() * a;
+    right += a.transpose() * at.error.head<3>();
+    before += at.error.head<3>().squaredNorm();
+  }
+  const Eigen::Vector3d c = Eigen::CompleteOrthogonalDecomposition<Eigen::Matrix3d>(normal).solve(right);
+  const double after = before - right.dot(c);
+  if (c.norm() < kLeastOriginMm || !(kOriginFitsBetter * kOriginFitsBetter * after < before)) return false;
+  const std::string words = fmt::format(
+      "the poses fit the commanded ones if LG's origin lies elsewhere by ({:.0f}, {:.0f}, {:.0f}) mm",
+      c.x() + 0.0, c.y() + 0.0, c.z() + 0.0);
+  result.findings.emplace_back(
+      words, "compare frames.LG.gd_mm, and the origins of UG and LG, with the point that the targets mean",
+      Severity::bad);
+  for (MeasuredPose& pose : result.poses) {
+    if (pose.pose) suspect(pose, words);
+  }
+  return true;
 }
 
 }  // namespace hexcal

@@ -166,7 +166,7 @@ void judge_against_targets(const std::map<std::string, Pose>& commanded, Campaig
   judge_names(commanded, result);
   if (!judge_axes(commanded, result)) {
     judge_places(commanded, result);
-    judge_target_steps(commanded, result);
+    if (!judge_origin(commanded, result)) judge_target_steps(commanded, result);
     return;
   }
   for (MeasuredPose& pose : result.poses) {

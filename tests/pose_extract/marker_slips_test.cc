@@ -154,6 +154,29 @@ TEST(WholeGripBumped, IsAStepAgainstTheTargets) {
   }
 }
 
+// gd_mm as it was not meant.
+TEST(WrongOrigin, IsNamedWhereTheTargetsKnowBetter) {
+  for (const double gd_mm : {50.0, 53.0, 500.0}) {
+    CampaignScene made = steady_scene(7, 2);
+    std::map<std::string, Pose> targets;
+    for (std::size_t e = 0; e < 7; ++e) {
+      Pose target = true_pose(made, e);
+      if (e > 0) target.position_mm += Eigen::Vector3d(0.2, -0.3, 0.1) + 0.01 * target.position_mm;
+      targets[made.observations.poses[e]] = target;
+    }
+    made.campaign.lg->gd_mm = gd_mm;
+    CampaignResult result = extract_poses(made.campaign, made.observations);
+    judge_against_targets(targets, result);
+    const bool wrong = gd_mm > 60;
+    ASSERT_EQ(result.findings.size(), wrong ? 1U : 0U) << gd_mm;
+    EXPECT_EQ(result.poses[3].status, wrong ? PoseStatus::suspect : PoseStatus::ok);
+    if (!wrong) continue;
+    EXPECT_THAT(
+        result.findings[0].cause,
+        ::testing::ContainsRegex("LG's origin lies elsewhere by \\(-?[0-9], -?[0-9], -4[45][0-9]\\) mm"));
+  }
+}
+
 TEST(PhotographingOrder, IsThatOfTheCaptureTimesWhereAllHaveOne) {
   CampaignScene made = steady_scene(3, 1);
   EXPECT_EQ(photographing_order(made.observations), (std::vector<std::size_t>{0, 1, 2}));
