@@ -119,7 +119,7 @@ int rows_for(Sheet sheet, int id) {
 
 std::vector<Candidate> slips_of(const Sheet& given, std::optional<std::pair<int, int>> ids) {
   std::vector<Candidate> out;
-  const auto add = [&out, &given](const Sheet& sheet, std::string words, int quarter_turns = 0) {
+  const auto add = [&out](const Sheet& sheet, std::string words, int quarter_turns = 0) {
     if (possible(sheet)) out.push_back({sheet, quarter_turns, std::move(words)});
   };
   const auto sized = [&](int columns, int rows) {
