@@ -182,6 +182,16 @@ TEST_F(InitWithCamera, AtATerminalThreeQuestionsAreAskedAtMost) {
   EXPECT_EQ(read_campaign(lab_).fixed.at(0), 24);
 }
 
+TEST(Init, AWordThatIsNoCommandIsToldWhichIsMeant) {
+  const CommandResult bare = run_hexcal({});
+  EXPECT_EQ(bare.exit_code, 2);
+  EXPECT_THAT(bare.err, AllOf(HasSubstr("hexcal init FOLDER begins"), HasSubstr("measure")));
+  const CommandResult misspelt = run_hexcal({"mesure", "lab"});
+  EXPECT_EQ(misspelt.exit_code, 2);
+  EXPECT_THAT(misspelt.err, HasSubstr("'mesure' is no command; did you mean measure?"));
+  EXPECT_THAT(run_hexcal({"measure"}).err, HasSubstr("campaign is required"));
+}
+
 TEST(Init, BeginsFromNothingWithStickersToPrint) {
   const TemporaryFolder folder;
   const fs::path lab = folder.path() / "lab";

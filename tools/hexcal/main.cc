@@ -1,6 +1,8 @@
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -12,6 +14,7 @@
 #include <system_error>
 
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/geometry/nearest_name.h"
 #include "tools/hexcal/commands.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/io/atomic_file.h"
@@ -35,6 +38,20 @@ void open_closed_streams() {
     if (::fcntl(stream, F_GETFD) < 0 && errno == EBADF)
       (void)::open("/dev/null", stream == 0 ? O_RDONLY : O_WRONLY);  // the lowest number that is free
   }
+}
+
+// The command line's first word is no command: a short overview, or the command that is meant.
+std::string no_command(const CLI::App& app, int argc, char** argv) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+  const auto word = std::find_if(argv + 1, argv + argc, [](const char* text) { return text[0] != '-'; });
+  if (word == argv + argc)
+    return fmt::format("wanted a command; hexcal init FOLDER begins, hexcal --help has all: {}",
+                       fmt::join(names, ", "));
+  if (std::find(names.begin(), names.end(), *word) != names.end()) return "";
+  const auto meant = hexcal::nearest_name(*word, names);
+  return fmt::format("'{}' is no command{}", hexcal::one_line(*word),
+                     meant ? fmt::format("; did you mean {}?", *meant) : " (see hexcal --help)");
 }
 
 int no_memory() {
@@ -78,7 +95,9 @@ int main(int argc, char** argv) {
   } catch (const CLI::Success& done) {  // --help, --version
     return app.exit(done);
   } catch (const CLI::ParseError& error) {
-    fmt::print(stderr, "hexcal: {} (see hexcal --help)\n", error.what());
+    const std::string words = no_command(app, argc, argv);
+    fmt::print(stderr, "hexcal: {}\n",
+               words.empty() ? std::string(error.what()) + " (see hexcal --help)" : words);
     return hexcal::kInputError;
   } catch (const hexcal::InputError& error) {
     fmt::print(stderr, "hexcal: {}\n", hexcal::one_line(error.what()));

@@ -14,6 +14,20 @@ namespace {
 
 constexpr int kShownRemarks = 10;
 
+// One line per file; files left out for one reason in a row are one line.
+std::string skipped_lines(const std::vector<SkippedFile>& skipped) {
+  std::string out;
+  for (std::size_t first = 0; first < skipped.size();) {
+    std::size_t last = first;
+    while (last + 1 < skipped.size() && skipped[last + 1].reason == skipped[first].reason) ++last;
+    out += last < first + 3 ? fmt::format("not used: {}: {}\n", skipped[first].name, skipped[first].reason)
+                            : fmt::format("not used: {} files from {} to {}: {}\n", last - first + 1,
+                                          skipped[first].name, skipped[last].name, skipped[first].reason);
+    first = last < first + 3 ? first + 1 : last + 1;
+  }
+  return out;
+}
+
 std::string length_line(const char* kind, const MeasuredLength& length) {
   const auto name = [](const MarkerPoint& point) {
     return point.corner < 0 ? fmt::format("{}", point.id) : fmt::format("{}.{}", point.id, point.corner);
@@ -76,8 +90,7 @@ std::string measurement_text(const CampaignMeasurement& measurement) {
   }
   if (remarked > kShownRemarks)
     out += fmt::format("and {} more photographs with remarks, see quality.json\n", remarked - kShownRemarks);
-  for (const SkippedFile& file : open.listing.skipped)
-    out += fmt::format("not used: {}: {}\n", file.name, file.reason);
+  out += skipped_lines(open.listing.skipped);
   for (const MeasuredLength& bar : result.bars) out += length_line("bar", bar);
   for (const MeasuredLength& check : result.checks) out += length_line("check", check);
   for (const Finding& finding : result.findings) {
