@@ -7,6 +7,7 @@
 #include <set>
 
 #include "kinematics/geometry/median.h"
+#include "kinematics/geometry/pose_pole.h"
 #include "photogrammetry/adjustment/planar_pose.h"
 #include "pose_extract/misplaced_photographs.h"
 
@@ -153,6 +154,12 @@ void judge_pose(const ExtractOptions& options, const EpochEvidence& evidence, st
     add_words(pose.words,
               fmt::format("sigma {:.3g} mm, wanted at most {} mm", sigma_mm, options.max_sigma_mm));
     return;
+  }
+  if (!roll_and_yaw_are_known(*pose.pose, pose.covariance)) {
+    const double pitch = pose.pose->rpy_rad.y();
+    suspect(pose,
+            fmt::format("pitch {:.4f} deg: roll and yaw turn about one axis there, only their {} is known",
+                        pitch * kDegPerRad, pitch > 0 ? "difference" : "sum"));
   }
   // Whose photographs contradict each other: a majority may be as wrong as one.
   for (std::size_t p = 0; p < result.photographs.size(); ++p) {

@@ -41,15 +41,18 @@ Matrix6d inverse_jacobian(const Rigid3& b_from_a) {
 }
 
 Matrix6d pose_parameters_jacobian(const Pose& pose) {
-  const double cp = std::cos(pose.rpy_rad.y());
+  constexpr double kLeastCosine = 1e-7;
   const double sp = std::sin(pose.rpy_rad.y());
   const double cy = std::cos(pose.rpy_rad.z());
   const double sy = std::sin(pose.rpy_rad.z());
-  // dr = (Rz Ry ex) droll + (Rz ey) dpitch + ez dyaw.
-  Eigen::Matrix3d rates;
-  rates << cy * cp, -sy, 0, sy * cp, cy, 0, -sp, 0, 1;
+  double cp = std::cos(pose.rpy_rad.y());
+  if (std::abs(cp) < kLeastCosine) cp = std::copysign(kLeastCosine, cp);
+  // dr = (Rz Ry ex) droll + (Rz ey) dpitch + ez dyaw, solved for the rates.
+  const Eigen::RowVector3d roll(cy / cp, sy / cp, 0);
   Matrix6d j = Matrix6d::Identity();
-  j.bottomRightCorner<3, 3>() = rates.inverse();
+  j.block<1, 3>(3, 3) = roll;
+  j.block<1, 3>(4, 3) << -sy, cy, 0;
+  j.block<1, 3>(5, 3) = sp * roll + Eigen::RowVector3d::UnitZ();
   return j;
 }
 

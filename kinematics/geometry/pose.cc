@@ -47,8 +47,17 @@ Pose pose_from_ug_from_lg(const Rigid3& UG_from_LG, double gd_mm) {
 }
 
 Vector6d pose_error(const Pose& actual, const Pose& target) {
-  Vector6d error = actual.vector() - target.vector();
-  for (int i = 3; i < 6; ++i) error[i] = wrap_angle(error[i]);
+  constexpr double kHalfTurn = 180.0 * kRadPerDeg;
+  const auto difference = [&target](const Eigen::Vector3d& rpy_rad) {
+    Eigen::Vector3d error = rpy_rad - target.rpy_rad;
+    for (double& angle : error) angle = wrap_angle(angle);
+    return error;
+  };
+  const Eigen::Vector3d& rpy = actual.rpy_rad;
+  const Eigen::Vector3d stated = difference(rpy);
+  const Eigen::Vector3d other = difference({rpy.x() + kHalfTurn, kHalfTurn - rpy.y(), rpy.z() + kHalfTurn});
+  Vector6d error;
+  error << actual.position_mm - target.position_mm, other.norm() < stated.norm() ? other : stated;
   return error;
 }
 

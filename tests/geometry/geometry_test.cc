@@ -4,6 +4,7 @@
 
 #include "kinematics/geometry/covariance.h"
 #include "kinematics/geometry/pose.h"
+#include "kinematics/geometry/pose_pole.h"
 #include "kinematics/geometry/rigid3.h"
 #include "tests/support/rigid_matchers.h"
 
@@ -68,6 +69,35 @@ TEST_F(Geometry, PoseErrorWraps) {
   const Pose a{{0, 0, 0}, {0, 0, 179 * kRadPerDeg}};
   const Pose b{{0, 0, 0}, {0, 0, -179 * kRadPerDeg}};
   EXPECT_NEAR(pose_error(a, b)[5] * kDegPerRad, -2.0, 1e-12);
+}
+
+// Pitch 180 deg is computed as roll and yaw of 180 deg, 270 deg as -90 deg; the error is that of the
+// rotation.
+TEST_F(Geometry, PoseErrorIsSmallForEveryNameOfARotation) {
+  for (const double pitch : {-269.0, -180.0, -100.0, -89.0, 0.0, 60.0, 91.0, 135.0, 180.0, 269.0}) {
+    const Pose target{{1, 2, 3}, {0.3, pitch * kRadPerDeg, -0.8}};
+    const Vector6d off = (Vector6d() << 0.1, 0.2, -0.1, 1e-3, -2e-3, 1.5e-3).finished();
+    const Pose actual = pose_from_home_from_lg(home_from_lg(Pose::from_vector(target.vector() + off)));
+    EXPECT_LE((pose_error(actual, target) - off).norm(), 1e-12) << pitch;
+  }
+}
+
+TEST_F(Geometry, NearThePoleOfPitchTheJacobianIsFiniteAndSaysThatRollAndYawAreNotKnown) {
+  Matrix6d motion = Matrix6d::Identity();
+  motion.bottomRightCorner<3, 3>() *= 1e-10;  // 2 arc seconds
+  for (const double degrees : {90.0, -90.0, 89.99999, 89.5, 80.0}) {
+    const Pose pose{{0, 0, 0}, {0.2, degrees * kRadPerDeg, 0.5}};
+    const Matrix6d j = pose_parameters_jacobian(pose);
+    ASSERT_TRUE(j.allFinite()) << degrees;
+    const Matrix6d covariance = j * motion * j.transpose();
+    EXPECT_EQ(roll_and_yaw_are_known(pose, covariance), std::abs(degrees) < 89.9) << degrees;
+    EXPECT_NEAR(covariance(4, 4), 1e-10, 1e-20);
+    const double sign = degrees > 0 ? -1 : 1;  // yaw - roll at +90 deg
+    const double together = covariance(5, 5) + covariance(3, 3) + 2 * sign * covariance(3, 5);
+    if (std::abs(degrees) < 89.9) {
+      EXPECT_NEAR(together, 1e-10, 0.2e-10) << degrees;
+    }
+  }
 }
 
 TEST_F(Geometry, CovarianceJacobiansMatchDifferences) {

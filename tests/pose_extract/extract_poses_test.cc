@@ -178,6 +178,55 @@ TEST_F(ExtractPoses, UgFromMarkersNeedsNoCoordinates) {
   EXPECT_LT(sum / count, 1.4);
 }
 
+// LG turned on its body so that p01 stands at just this rotation.
+void turn_lower_grip(CampaignScene& made, const Eigen::Quaterniond& rotation_of_p01) {
+  const Rigid3 LG_from_moving(rotation_of_p01.conjugate() * made.scene.fixed_from_moving[1].rotation,
+                              Eigen::Vector3d(3, -2, 1));
+  FrameRule lg;
+  lg.gd_mm = 50;
+  for (std::size_t m = 0; m < made.scene.network.features.size(); ++m) {
+    const NetworkFeature& marker = made.scene.network.features[m];
+    if (marker.body == kReferenceBody) continue;
+    const Rigid3 LG_from_marker = LG_from_moving * made.scene.body_from_marker[m];
+    for (int c = 0; c < 4; ++c)
+      lg.nominal.push_back({{marker.id, c}, LG_from_marker * made.scene.printed_points(m).col(c), 0.001});
+  }
+  made.campaign.lg = lg;
+}
+
+TEST_F(ExtractPoses, AtEveryPitchTheErrorsAreWithinTheirSigmasOrThePoseIsSuspect) {
+  for (const double degrees : {89.5, 90.0, 180.0, 270.0}) {
+    const Pose stated{{}, {0.3, degrees * kRadPerDeg, -0.7}};
+    double sum = 0;
+    int count = 0;
+    for (unsigned seed = 1; seed <= 3; ++seed) {
+      ObservationSceneOptions options;
+      options.num_epochs = 2;
+      options.noise_px = 0.01;
+      options.seed = seed;
+      made_ = make_campaign_scene(options);
+      turn_lower_grip(made_, quaternion_from_rpy(stated.rpy_rad));
+      const CampaignResult result = extract_poses(made_.campaign, made_.observations);
+      const MeasuredPose& measured = pose(result, "p01");
+      ASSERT_TRUE(measured.pose) << measured.words;
+      EXPECT_TRUE(measured.covariance.allFinite());
+      EXPECT_LE(
+          rotation_distance(quaternion_from_rpy(measured.pose->rpy_rad), quaternion_from_rpy(stated.rpy_rad)),
+          1e-3);
+      const bool at_pole = degrees == 90.0 || degrees == 270.0;
+      EXPECT_EQ(measured.status, at_pole ? PoseStatus::suspect : PoseStatus::ok) << degrees;
+      EXPECT_EQ(measured.words.find("roll and yaw turn about one axis") != std::string::npos, at_pole);
+      if (at_pole) continue;
+      const Vector6d error = pose_error(*measured.pose, stated);
+      sum += error.tail<3>().dot(measured.covariance.bottomRightCorner<3, 3>().ldlt().solve(error.tail<3>()));
+      count += 3;
+    }
+    if (count == 0) continue;
+    EXPECT_GT(sum / count, 0.12) << degrees;  // chi2 of 9 numbers: within these in 998 of 1000
+    EXPECT_LT(sum / count, 3.1) << degrees;
+  }
+}
+
 TEST_F(ExtractPoses, UnreadablePhotographIsNamedAndItsPoseGoesOn) {
   seen("p02", 1).status = PhotographStatus::truncated;
   seen("p02", 1).reason = "ends after 40 of 100 kB";

@@ -9,6 +9,7 @@
 #include "kinematics/geometry/covariance.h"
 #include "kinematics/geometry/input_error.h"
 #include "kinematics/geometry/median.h"
+#include "kinematics/geometry/pose_pole.h"
 #include "tools/io/marker_table.h"
 #include "tools/io/photo_table.h"
 #include "tools/io/quality_file.h"
@@ -148,7 +149,8 @@ ScenePose scene_pose(const PoseRecord& record, double gd_mm, const MarkerSet& ma
   const Rigid3 UG_from_LG = ug_from_lg(*record.pose, gd_mm);
   out.frames.push_back({"LG", UG_from_LG});
   const auto covariance = covariances.find(record.id);
-  const bool uncertain = covariance != covariances.end() && covariance->second.trace() > 0;
+  const bool uncertain = covariance != covariances.end() && covariance->second.trace() > 0 &&
+                         roll_and_yaw_are_known(*record.pose, covariance->second);
   const auto add_ellipsoid = [&](const Eigen::Vector3d& point_in_LG) {
     const Eigen::Vector3d arm = UG_from_LG.rotation * point_in_LG;
     out.ellipsoids.push_back({UG_from_LG * point_in_LG,
