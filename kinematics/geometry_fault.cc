@@ -7,6 +7,10 @@
 namespace hexcal {
 namespace {
 
+// Legs that are longer are no machine's; workspaces of such a size take for ever.
+constexpr double kLongestLeg = 200;
+// Sine of the angle between a screw's leg and the axes of its joints: along the leg they do not hold it.
+constexpr double kAlongLeg = 0.01;
 // Relative to the machine's size; joints of real machines stand millimetres apart.
 constexpr double kCoincident = 1e-6;
 // Joints written with three decimals leave this much of an exact singularity.
@@ -93,6 +97,16 @@ std::optional<std::string> geometry_fault(const PlatformGeometry& geometry) {
   if (auto fault = joint_fault(geometry)) return fault;
   const Rigid3 home = geometry.home_B_from_P();
   const LegVector lengths = leg_lengths(geometry, home);
+  for (std::size_t i = 0; i < 6; ++i) {
+    if (geometry.actuators[i].max_mm > kLongestLeg * characteristic_length_mm(geometry))
+      return leg(i) + ": max_mm is more than 200 times the platform's size";
+    if (!geometry.screw) continue;
+    const Eigen::Vector3d along =
+        (home * geometry.platform_joints_mm[i] - geometry.base_joints_mm[i]).normalized();
+    if (along.cross(geometry.screw->base_axes[i]).norm() < kAlongLeg ||
+        along.cross(home.rotation * geometry.screw->platform_axes[i]).norm() < kAlongLeg)
+      return leg(i) + ": an axis of its screw's joints points along the leg at home";
+  }
   for (std::size_t i = 0; i < 6; ++i) {
     if (lengths[static_cast<Eigen::Index>(i)] <= kCoincident * characteristic_length_mm(geometry))
       return leg(i) + ": has no length at home";

@@ -68,7 +68,7 @@ void SliceOptions::validate() const {
       !std::isfinite(v_high - v_low))
     throw InputError("SliceOptions: a range must be finite and not reversed");
   if (u_count < 1 || v_count < 1) throw InputError("SliceOptions.u_count and v_count must be at least 1");
-  if (threads < 1) throw InputError("SliceOptions.threads must be at least 1");
+  if (threads < 1 || threads > 256) throw InputError("SliceOptions.threads must be 1 to 256");
 }
 
 SliceCell judge_pose(const PlatformGeometry& geometry, const RestState& rest, const Pose& pose) {

@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/geometry/printable_text.h"
 #include "photogrammetry/photograph/photograph_format.h"
 
 namespace hexcal {
@@ -126,7 +127,7 @@ class Lister {
   };
 
   [[nodiscard]] std::string name(const fs::path& path) const {
-    return path.lexically_relative(root_).generic_string();
+    return printable_text(path.lexically_relative(root_).generic_string());
   }
   void skip(const fs::path& file, const std::string& reason) {
     listing_.skipped.push_back({name(file), reason});
@@ -233,7 +234,7 @@ class Lister {
       const fs::path named = key.empty() ? fs::absolute(root_).lexically_normal() : key;
       const std::string last = named.filename().string();
       const bool alone = times[last] <= 1 && options_.table.empty();
-      const std::string id = alone ? last : named.generic_string();
+      const std::string id = printable_text(alone ? last : named.generic_string());
       listing_.poses.push_back(id);
       for (const Found& found : files)
         listing_.images.push_back({found.file, name(found.file), id, found.camera});

@@ -3,6 +3,7 @@
 #include <limits>
 #include <mutex>
 
+#include "kinematics/geometry/printable_text.h"
 #include "photogrammetry/photograph/decoders.h"
 #include "photogrammetry/photograph/file_signature.h"
 
@@ -21,7 +22,7 @@ class ExifReader {
     value.erase(last == std::string::npos ? 0 : last + 1);
     value.erase(0, value.find_first_not_of(' '));
     if (value.empty()) return std::nullopt;
-    return value;
+    return printable_text(value);
   }
 
   [[nodiscard]] std::optional<double> number(const char* key) const {

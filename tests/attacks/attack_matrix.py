@@ -71,10 +71,10 @@ def all_attacks(commands):
         call = CALLS[command["name"]]
         for option in command["options"]:
             label = option["names"][-1] if option["names"] else option["positional"]
-            for name, value, prepare in attacks.values():
+            for name, value, prepare, process in attacks.values(option):
                 arguments = with_value(call, option, value)
                 if arguments is not None:
-                    yield f"{command['name']} {label} {name}", arguments, prepare, {}
+                    yield f"{command['name']} {label} {name}", arguments, prepare, process
         for name, arguments, prepare, process in attacks.of_call(call):
             yield f"{command['name']} {name}", arguments, prepare, process
 

@@ -71,6 +71,23 @@ TEST_F(Measure, ACameraOfAnotherImageSizeIsRefusedWithBothSizes) {
       AllOf(HasSubstr("none of the 6 photographs"), HasSubstr("1504 x 1000"), HasSubstr("1500 x 1000")));
 }
 
+TEST_F(Measure, TwoPhotographsNeverShareAnOverlay) {
+  const fs::path from = lab_ / "poses" / "p001";
+  for (const char* name : {"x/y_1.jpg", "x_y/1.jpg", "x/1.jpg"}) {
+    fs::create_directories((lab_ / "poses" / name).parent_path());
+    fs::copy(from / "DSC_0004.jpg", lab_ / "poses" / name);
+  }
+  const std::string long_name(150, 'n');
+  fs::create_directories(lab_ / "poses" / long_name);
+  fs::copy(from / "DSC_0004.jpg", lab_ / "poses" / long_name / (long_name + ".jpg"));
+  const CommandResult result = run_hexcal({"measure", lab_.string(), "--overlays"});
+  EXPECT_EQ(result.exit_code, 1) << result.err;  // photographs that stand twice
+  std::size_t overlays = 0;
+  for (const auto& entry : fs::directory_iterator(lab_ / "results" / "overlays"))
+    overlays += entry.is_regular_file();
+  EXPECT_EQ(overlays, 10U);
+}
+
 TEST_F(Measure, ATruncatedPhotographIsLeftOutAndNamed) {
   fs::resize_file(lab_ / "poses" / "p001" / "DSC_0004.jpg", 30000);
   const CommandResult result = measure();

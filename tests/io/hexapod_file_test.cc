@@ -60,7 +60,8 @@ TEST(HexapodFile, SaysWhatIsWrong) {
   EXPECT_THAT(refusal(good + "stroke_mm: 3\n"), HasSubstr("stroke_mm"));
   EXPECT_THAT(refusal(replaced(good, "min_mm: 380", "min_mm: 680")),
               HasSubstr("leg 1: max_mm must be greater"));
-  EXPECT_THAT(refusal(replaced(good, "mm_per_unit: 1", "mm_per_unit: 0")), HasSubstr("mm_per_unit is zero"));
+  EXPECT_THAT(refusal(replaced(good, "mm_per_unit: 1", "mm_per_unit: 0")),
+              HasSubstr("mm_per_unit: found 0, wanted at least 1e-09"));
   EXPECT_THAT(refusal(replaced(good, "home", "hime")), HasSubstr("home: missing"));
 }
 

@@ -50,8 +50,13 @@ class Kinematics(unittest.TestCase):
     def test_wrong_input_is_refused_with_words(self):
         with self.assertRaisesRegex(hexcal.InputError, "nothere.yaml"):
             hexcal.read_hexapod("nothere.yaml")
-        with self.assertRaises(TypeError):
-            self.machine.inverse(np.zeros((3, 5)))
+        for wrong, found in ((np.zeros((3, 5)), r"shape \(3, 5\)"), (np.zeros(5), r"shape \(5\)"), ("home", "str"),
+                             (np.zeros((2, 6, 6)), r"shape \(2, 6, 6\)"), (None, "NoneType"), ([[1], [2, 3]], "list")):
+            with self.assertRaisesRegex(hexcal.InputError, f"^found .*{found}.*, wanted numbers of shape \\(N, 6\\)$"):
+                self.machine.inverse(wrong)
+        with self.assertRaisesRegex(hexcal.InputError, r"wanted numbers of shape \(6, 3\)"):
+            hexcal.Machine(np.zeros((5, 3)), self.machine.platform_joints_mm, B_from_UG=np.eye(4), P_from_LG=np.eye(4),
+                           gd_mm=50, min_mm=380, max_mm=580)
         with self.assertRaisesRegex(ValueError, "B_from_UG"):
             hexcal.Machine(self.machine.base_joints_mm, self.machine.platform_joints_mm, B_from_UG=2 * np.eye(4),
                            P_from_LG=np.eye(4), gd_mm=50, min_mm=380, max_mm=580)

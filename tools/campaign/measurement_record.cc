@@ -5,12 +5,14 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <chrono>
 #include <nlohmann/json.hpp>
 
 #include "kinematics/geometry/input_error.h"
 #include "photogrammetry/photograph/sha256.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/json_text.h"
+#include "tools/io/kept_text.h"
 
 namespace hexcal {
 namespace fs = std::filesystem;
@@ -58,6 +60,14 @@ std::vector<fs::path> files_read(const MeasureRequest& request, const OpenCampai
   return files;
 }
 
+// A file that was written since may not be the one that was read.
+bool is_older_than(const fs::path& file, fs::file_time_type time) {
+  constexpr std::chrono::milliseconds kClockTick(10);
+  std::error_code error;
+  const fs::file_time_type written = fs::last_write_time(file, error);
+  return error || written < time - kClockTick;
+}
+
 std::vector<FileHash> hashes_of(const std::vector<fs::path>& files, ReadFor purpose) {
   std::vector<FileHash> hashes;
   for (const fs::path& file : files) hashes.emplace_back(file.string(), hash_if_readable(file, purpose));
@@ -82,7 +92,10 @@ std::optional<MeasurementAnswer> unchanged_measurement(const MeasureRequest& req
   const fs::path path = record_file(open);
   if (!request.cache || !fs::exists(path)) return std::nullopt;
   try {
-    const auto record = nlohmann::json::parse(read_file(path, ReadFor::own_result));
+    const std::string text = read_file(path, ReadFor::own_result);
+    const auto kept = unsealed_json(text);
+    if (!kept) return std::nullopt;
+    const auto record = nlohmann::json::parse(*kept);
     if (record.at("circumstances").get<std::string>() != circumstances(request, open)) return std::nullopt;
     const auto read = record.at("read").get<std::vector<FileHash>>();
     if (read != hashes_of(files_read(request, open), ReadFor::input)) return std::nullopt;
@@ -99,14 +112,18 @@ std::optional<MeasurementAnswer> unchanged_measurement(const MeasureRequest& req
     return answer;
   } catch (const nlohmann::json::exception&) {
   } catch (const InputError&) {
-    // A damaged record is made anew.
+    // It cannot be read: it is made anew.
   }
   return std::nullopt;
 }
 
 void keep_measurement(const MeasureRequest& request, const OpenCampaign& open,
                       const CampaignObservations& observations, const MeasurementAnswer& answer) {
-  if (!request.cache) return;
+  const std::vector<fs::path> read = files_read(request, open);
+  if (!request.cache ||
+      !std::ranges::all_of(read, [&](const fs::path& file) { return is_older_than(file, open.opened); })) {
+    return;
+  }
   std::vector<FileHash> photographs;
   for (std::size_t i = 0; i < open.listing.images.size(); ++i) {
     // What was decoded counts, not what may have taken its place since.
@@ -115,12 +132,12 @@ void keep_measurement(const MeasureRequest& request, const OpenCampaign& open,
     photographs.emplace_back(open.listing.images[i].path.string(), was_empty ? sha256_hex("") : seen.sha256);
   }
   const nlohmann::ordered_json record{{"circumstances", circumstances(request, open)},
-                                      {"read", hashes_of(files_read(request, open), ReadFor::input)},
+                                      {"read", hashes_of(read, ReadFor::input)},
                                       {"photographs", photographs},
                                       {"written", hashes_of(answer.written, ReadFor::own_result)},
                                       {"exit_code", answer.exit_code},
                                       {"text", answer.text}};
-  write_file_atomically(record_file(open), json_text(record, 1), Keep::unless_power_fails);
+  write_file_atomically(record_file(open), sealed_json(json_text(record, 1)), Keep::unless_power_fails);
 }
 
 }  // namespace hexcal

@@ -22,7 +22,8 @@ struct MeasurementAnswer {
 [[nodiscard]] std::optional<MeasurementAnswer> unchanged_measurement(const MeasureRequest& request,
                                                                      const OpenCampaign& open);
 
-/// Keeps an answer for unchanged_measurement, in the cache of the results.
+/// Keeps an answer for unchanged_measurement, in the cache of the results, unless a file that was read has
+/// been written since the campaign was opened.
 void keep_measurement(const MeasureRequest& request, const OpenCampaign& open,
                       const CampaignObservations& observations, const MeasurementAnswer& answer);
 

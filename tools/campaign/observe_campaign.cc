@@ -12,6 +12,7 @@
 #include "photogrammetry/photograph/photograph_file.h"
 #include "photogrammetry/photograph/sha256.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/kept_text.h"
 #include "tools/io/observations_file.h"
 #include "tools/io/version.h"
 
@@ -19,7 +20,7 @@ namespace hexcal {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kCacheFormat = 3;  // counts up when detection changes what it finds
+constexpr int kCacheFormat = 4;  // counts up when detection changes what it finds
 
 std::string ids_text(const std::vector<int>& ids) {
   std::string text;
@@ -37,10 +38,13 @@ fs::path cache_file(const OpenCampaign& open, const std::string& photograph_sha2
 std::optional<PhotographObservations> cached(const fs::path& file) {
   if (!fs::exists(file)) return std::nullopt;
   try {
-    DetectionSet set = read_observations(file, ReadFor::own_result);
+    const std::string text = read_file(file, ReadFor::own_result);
+    const auto kept = unsealed_text(text);
+    if (!kept) return std::nullopt;  // an edited or damaged entry is made anew
+    DetectionSet set = parse_observations(*kept, file);
     if (set.photographs.size() == 1) return std::move(set.photographs.front());
   } catch (const InputError&) {
-    // A damaged entry is made anew.
+    // It cannot be read: it is made anew.
   }
   return std::nullopt;
 }
@@ -133,7 +137,7 @@ CampaignPhotograph observe_image(const OpenCampaign& open, const CampaignImage& 
   if (use_cache && fits && seen.status == PhotographStatus::ok) {
     const std::string& camera_sha256 = open.camera_sha256[static_cast<std::size_t>(camera)];
     write_file_atomically(cache_file(open, file.sha256, camera),
-                          observations_text({open.campaign.family, camera_sha256, {seen}}),
+                          sealed_text(observations_text({open.campaign.family, camera_sha256, {seen}})),
                           Keep::unless_power_fails);
   }
   return {image.pose, camera, std::move(seen)};
@@ -151,15 +155,21 @@ std::string observations_of_campaign(const std::string& head, const OpenCampaign
   for (const CampaignPhotograph& photograph : observations.photographs) names.push_back(photograph.seen.name);
   const std::vector<ImagePlace> places = places_of_names(names, camera_folders(open.campaign));
   DetectionSet set{open.campaign.family, open.camera_sha256.size() == 1 ? open.camera_sha256[0] : "", {}};
+  std::set<std::string> taken;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const CampaignPhotograph& photograph = observations.photographs[i];
     set.photographs.push_back(photograph.seen);
     // Poses that a table or the time of exposure tells apart are folders in the file.
+    std::string& name = set.photographs.back().name;
     if (places[i].pose != photograph.pose) {
-      set.photographs.back().name =
-          (fs::path(photograph.pose) / places[i].camera_folder / fs::path(names[i]).filename())
-              .generic_string();
+      const fs::path folder = fs::path(photograph.pose) / places[i].camera_folder;
+      name = (folder / fs::path(names[i]).filename()).generic_string();
+      if (taken.count(name) != 0) {  // of another folder
+        std::replace(names[i].begin(), names[i].end(), '/', '_');
+        name = (folder / names[i]).generic_string();
+      }
     }
+    taken.insert(name);
   }
   return observations_text(set, head);
 }

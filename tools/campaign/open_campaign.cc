@@ -14,7 +14,12 @@
 namespace hexcal {
 namespace fs = std::filesystem;
 OpenCampaign open_campaign(const MeasureRequest& request) {
+  constexpr int kMostThreads = 256;
+  if (request.threads < 0 || request.threads > kMostThreads)
+    throw InputError(
+        fmt::format("threads: found {}, wanted 0 (all processors) to {}", request.threads, kMostThreads));
   OpenCampaign open;
+  open.opened = fs::file_time_type::clock::now();
   open.campaign = read_campaign(request.campaign);
   if (request.home) {
     if (!open.campaign.lg || open.campaign.lg->from != FrameRule::From::home) {

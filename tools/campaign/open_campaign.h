@@ -29,6 +29,7 @@ struct MeasureRequest {
 
 /// A campaign as its files say, read and checked.
 struct OpenCampaign {
+  std::filesystem::file_time_type opened;  ///< before the first of its files was read
   Campaign campaign;
   std::filesystem::path results;  ///< folder of the results
   std::filesystem::path poses_csv;

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "photogrammetry/photograph/photograph.h"
+#include "photogrammetry/photograph/sha256.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/residual_file.h"
 
@@ -84,6 +85,25 @@ void draw_legend(const std::string& text, cv::Mat& image) {
   draw_text(image, all, start + Eigen::Vector2d(length + height + 0.5 * size.width, 0), height, kNotMeasured);
 }
 
+// Folders and file in one name; with a hash of it where another photograph's would be the same, or the system
+// takes no name so long.
+std::string overlay_name(const ImageListing& listing, std::size_t photograph) {
+  constexpr std::size_t kLongest = 240;
+  constexpr std::size_t kKept = 200;
+  const auto flat = [&listing](std::size_t i) {
+    std::string name = listing.images[i].name;
+    std::replace(name.begin(), name.end(), '/', '_');
+    const bool is_jpeg = name.ends_with(".jpg") || name.ends_with(".JPG");
+    return is_jpeg ? name : name + ".jpg";
+  };
+  const std::string name = flat(photograph);
+  bool alone = name.size() <= kLongest;
+  for (std::size_t i = 0; i < listing.images.size() && alone; ++i) alone = i == photograph || flat(i) != name;
+  if (alone) return name;
+  return fmt::format("{}.{}.jpg", name.substr(0, std::min(kKept, name.size() - 4)),
+                     sha256_hex(listing.images[photograph].name).substr(0, 12));
+}
+
 }  // namespace
 
 std::optional<std::filesystem::path> write_overlay(const OpenCampaign& open,
@@ -117,10 +137,7 @@ std::optional<std::filesystem::path> write_overlay(const OpenCampaign& open,
       image);
   std::vector<unsigned char> bytes;
   cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
-  std::string name = entry.name;
-  std::replace(name.begin(), name.end(), '/', '_');
-  const bool is_jpeg = name.ends_with(".jpg") || name.ends_with(".JPG");
-  const std::filesystem::path path = open.results / "overlays" / (is_jpeg ? name : name + ".jpg");
+  const std::filesystem::path path = open.results / "overlays" / overlay_name(open.listing, photograph);
   write_file_atomically(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   return path;
 }

@@ -10,7 +10,7 @@ mirror=${HEXCAL_DEBIAN_MIRROR:-http://deb.debian.org/debian}
 [ "$(id -u)" -eq 0 ] || { echo "try_deb: needs root, for debootstrap and chroot" >&2; exit 2; }
 command -v debootstrap >/dev/null || { echo "try_deb: debootstrap is missing: apt-get install debootstrap" >&2; exit 2; }
 
-cmake --preset release --log-level=WARNING
+cmake --preset release --log-level=WARNING -DHEXCAL_HARDENED=ON
 cmake --build --preset release --target install_tests
 rm -rf "$work"
 mkdir -p "$work/packages"
@@ -18,6 +18,7 @@ mkdir -p "$work/packages"
 for package in "$work"/packages/*.deb; do
   dpkg-deb --show --showformat='${Package} ${Version}: ${Depends}\n' "$package"
 done
+tests/install/hardened.sh build/release/hexcal $(find build/release/tools/python -name '_hexcal*.so')
 
 chroot=$work/chroot
 debootstrap --variant=minbase bookworm "$chroot" "$mirror" >"$work/debootstrap.log"

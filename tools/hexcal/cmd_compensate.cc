@@ -16,6 +16,7 @@
 #include "tools/io/calibration_record.h"
 #include "tools/io/campaign_file.h"
 #include "tools/io/hexapod_file.h"
+#include "tools/io/measurement_id.h"
 #include "tools/io/model_file.h"
 #include "tools/io/observation_table.h"
 #include "tools/io/pose_table.h"
@@ -39,9 +40,15 @@ void resolve(CompensateFlags& flags) {
     if (flags.hexapod.empty() && campaign.hexapod) flags.hexapod = *campaign.hexapod;
     if (flags.targets.empty() && campaign.targets) flags.targets = *campaign.targets;
     if (flags.legs.empty() && campaign.legs) flags.legs = *campaign.legs;
-    if (flags.poses.empty()) flags.poses = results / "poses.csv";
-    if (flags.covariance.empty() && fs::exists(results / "poses_covariance.csv"))
-      flags.covariance = results / "poses_covariance.csv";
+    const fs::path covariance = results / "poses_covariance.csv";
+    if (flags.poses.empty()) {
+      flags.poses = results / "poses.csv";
+      if (flags.covariance.empty()) require_one_measurement(flags.poses, {covariance});
+    }
+    // Of poses that were measured elsewhere the campaign's covariances say nothing.
+    if (flags.covariance.empty() && fs::exists(covariance) &&
+        !of_another_measurement(flags.poses, {covariance}))
+      flags.covariance = covariance;
     if (flags.out.empty()) flags.out = results;
   }
   if (flags.out.empty()) flags.out = ".";
@@ -131,10 +138,13 @@ int run_compensate(CompensateFlags flags) {
   defaults.with_suspect = flags.with_suspect;
   if (flags.position_sigma_mm > 0) defaults.position_sigma_mm = flags.position_sigma_mm;
   if (flags.orientation_sigma_deg > 0) defaults.orientation_sigma_deg = flags.orientation_sigma_deg;
+  if (!flags.covariance.empty() && measurement_of(flags.poses) && measurement_of(flags.covariance))
+    require_one_measurement(flags.poses, {flags.covariance});
   const ObservationFiles files{.poses = flags.poses,
                                .targets = optional_path(flags.targets),
                                .legs = optional_path(flags.legs),
                                .covariance = optional_path(flags.covariance)};
+  const std::string key = calibration_key(kVersion, flags.hexapod, files, flags.method);
   ObservationTable table = read_observations(nominal, files, defaults);
   std::vector<fs::path> inputs{flags.hexapod, flags.targets, flags.poses, flags.legs, flags.covariance};
   if (flags.round > 1) add_later_rounds(nominal, flags, defaults, table, inputs);
@@ -153,8 +163,8 @@ int run_compensate(CompensateFlags flags) {
   const bool plain = flags.round == 1 && defaults.frames_known && !flags.with_suspect &&
                      flags.fixed.empty() && flags.tolerance_mm <= 0 && !defaults.position_sigma_mm &&
                      !defaults.orientation_sigma_deg;
-  if (plain && !flags.campaign.empty()) {
-    const std::string key = calibration_key(kVersion, flags.hexapod, files, flags.method);
+  const bool unchanged = key == calibration_key(kVersion, flags.hexapod, files, flags.method);
+  if (plain && unchanged && !flags.campaign.empty()) {
     write_file_atomically(flags.out / "calibration.json", calibration_record_text(key, report));
   }
 

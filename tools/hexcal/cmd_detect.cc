@@ -6,8 +6,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/geometry/printable_text.h"
 #include "photogrammetry/markers/detect.h"
 #include "photogrammetry/photograph/photograph_format.h"
 #include "photogrammetry/photograph/sha256.h"
@@ -45,34 +47,63 @@ struct Source {
   std::string name;  // as written
 };
 
-// Names are relative to `base`, or, without one, to the folder that was given.
+// The deepest folder above all that was given.
+fs::path common_folder(const std::vector<fs::path>& inputs) {
+  fs::path common;
+  for (const fs::path& input : inputs) {
+    const fs::path whole = fs::absolute(fs::is_directory(input) ? input / "" : input).lexically_normal();
+    const fs::path folder = whole.parent_path();
+    if (&input == &inputs.front()) {
+      common = folder;
+      continue;
+    }
+    fs::path shared;
+    const auto end = std::mismatch(common.begin(), common.end(), folder.begin(), folder.end()).first;
+    for (auto part = common.begin(); part != end; ++part) shared /= *part;
+    common = shared;
+  }
+  return common;
+}
+
+std::string name_below(const fs::path& folder, const fs::path& file) {
+  const fs::path name =
+      fs::absolute(file).lexically_normal().lexically_relative(fs::absolute(folder / "").lexically_normal());
+  if (name.empty() || *name.begin() == "..")
+    throw InputError(
+        fmt::format("--relative-to: found {}, wanted a folder above {}", folder.string(), file.string()));
+  return printable_text(name.generic_string());
+}
+
+// Names are relative to `base`, or, without one, to the folder that was given; where two files would have one
+// name, to the folder that holds all that was given. What was given twice is taken once.
 std::vector<Source> list_photographs(const std::vector<fs::path>& inputs, const fs::path& base) {
-  const auto name_of = [&base](const fs::path& file, const fs::path& folder) {
-    const fs::path from = base.empty() ? folder : base;
-    const fs::path name =
-        fs::absolute(file).lexically_normal().lexically_relative(fs::absolute(from / "").lexically_normal());
-    if (name.empty() || *name.begin() == "..")
-      throw InputError(
-          fmt::format("--relative-to: found {}, wanted a folder above {}", from.string(), file.string()));
-    return name.generic_string();
-  };
   std::vector<Source> sources;
+  std::set<fs::path> files;
+  std::set<std::string> names;
+  const auto add = [&](const fs::path& file, const fs::path& folder) {
+    if (!files.insert(fs::absolute(file).lexically_normal()).second) return;
+    sources.push_back({file, name_below(base.empty() ? folder : base, file)});
+    names.insert(sources.back().name);
+  };
   for (const fs::path& input : inputs) {
     if (!fs::is_directory(input)) {
       if (!fs::exists(input)) throw InputError(fmt::format("{}: no such file", input.string()));
-      sources.push_back({input, base.empty() ? input.filename().string() : name_of(input, {})});
+      add(input, input.has_parent_path() ? input.parent_path() : ".");
       continue;
     }
-    std::vector<Source> found;
+    std::vector<fs::path> found;
     for (const auto& entry : fs::recursive_directory_iterator(input)) {
-      if (entry.is_regular_file() && photograph_format(entry.path()) != PhotographFormat::none) {
-        found.push_back({entry.path(), name_of(entry.path(), input)});
-      }
+      if (entry.is_regular_file() && photograph_format(entry.path()) != PhotographFormat::none)
+        found.push_back(entry.path());
     }
-    std::sort(found.begin(), found.end(), [](const Source& a, const Source& b) { return a.name < b.name; });
+    std::sort(found.begin(), found.end(),
+              [](const fs::path& a, const fs::path& b) { return a.generic_string() < b.generic_string(); });
     if (found.empty()) throw InputError(fmt::format("{}: no photographs in this folder", input.string()));
-    sources.insert(sources.end(), found.begin(), found.end());
+    for (const fs::path& file : found) add(file, input);
   }
+  if (names.size() == sources.size()) return sources;
+  const fs::path common = common_folder(inputs);
+  for (Source& source : sources) source.name = name_below(common, source.path);
   return sources;
 }
 

@@ -15,6 +15,7 @@
 #include "tools/hexcal/error_tables.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/io/json_text.h"
+#include "tools/io/measurement_id.h"
 #include "tools/io/pose_table.h"
 
 namespace hexcal {
@@ -48,6 +49,10 @@ struct EvaluatedTable {
 EvaluatedTable read_table(const fs::path& path, const std::string& label, const PoseById& targets) {
   EvaluatedTable table;
   table.label = label;
+  const fs::path covariance = path.parent_path() / "poses_covariance.csv";
+  if (measurement_of(path) && of_another_measurement(path, {covariance}))
+    fmt::print(stderr, "{}: is of another measurement than {} beside it\n", path.string(),
+               covariance.string());
   for (const PoseRecord& record : read_pose_table(path)) {
     if (!record.pose) {
       table.without_pose.push_back(record.id);

@@ -1,9 +1,14 @@
 #include "tools/hexcal/command_line.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "kinematics/geometry/input_error.h"
 #include "tools/io/json_text.h"
+#include "tools/io/number_range.h"
+#include "tools/io/scalar_text.h"
 
 namespace hexcal {
 namespace {
@@ -70,6 +75,22 @@ nlohmann::ordered_json json_of(const CommandLine& command) {
 }  // namespace
 
 std::string command_json(const CommandLine& app) { return json_text(json_of(app), 1) + "\n"; }
+
+void check_numbers(const CLI::App& app) {
+  for (const CLI::App* command : app.get_subcommands()) {
+    for (const CLI::Option* option : command->get_options()) {
+      if (!option->get_type_name().starts_with("FLOAT")) continue;
+      const std::string name = option->get_name();
+      for (const std::string& text : option->results()) {
+        const auto value = number_from_text(text);
+        if (!value) throw InputError(fmt::format("{}: found '{}', wanted a number", name, text));
+        std::string fault;
+        (void)ranged_number(name, *value, fault);
+        if (!fault.empty()) throw InputError(fmt::format("{}: {}", name, fault));
+      }
+    }
+  }
+}
 
 CommandLine command_line_of(const CLI::App& app) {
   CommandLine out;

@@ -27,6 +27,10 @@ struct CommandLine {
 
 [[nodiscard]] CommandLine command_line_of(const CLI::App& app);
 
+/// Refuses numbers of the command that was given which no machine or photograph has: not finite, or outside
+/// of number_range.h. Throws InputError.
+void check_numbers(const CLI::App& app);
+
 /// All of it as JSON, for programs that call hexcal.
 [[nodiscard]] std::string command_json(const CommandLine& app);
 

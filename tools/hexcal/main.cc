@@ -1,6 +1,8 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <pthread.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -11,11 +13,17 @@
 #include <new>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
+#include <string>
+#include <string_view>
 #include <system_error>
+#include <thread>
 
 #include "kinematics/geometry/input_error.h"
 #include "kinematics/geometry/nearest_name.h"
+#include "kinematics/geometry/printable_text.h"
+#include "tools/hexcal/command_line.h"
 #include "tools/hexcal/commands.h"
+#include "tools/hexcal/printable_output.h"
 #include "tools/hexcal/terminal.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/output_file.h"
@@ -50,7 +58,7 @@ std::string no_command(const CLI::App& app, int argc, char** argv) {
                        fmt::join(names, ", "));
   if (std::find(names.begin(), names.end(), *word) != names.end()) return "";
   const auto meant = hexcal::nearest_name(*word, names);
-  return fmt::format("'{}' is no command{}", hexcal::one_line(*word),
+  return fmt::format("'{}' is no command{}", hexcal::printable_text(*word),
                      meant ? fmt::format("; did you mean {}?", *meant) : " (see hexcal --help)");
 }
 
@@ -59,10 +67,14 @@ int no_memory() {
   return hexcal::kInputError;
 }
 
-}  // namespace
+int refused_thread(const char* reason) {
+  fmt::print(stderr,
+             "hexcal: the system starts no more threads ({}); wanted fewer --threads, or a higher limit\n",
+             hexcal::printable_text(reason));
+  return hexcal::kInputError;
+}
 
-int main(int argc, char** argv) {
-  open_closed_streams();
+int run(int argc, char** argv) {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // a photograph's status says it
   std::signal(SIGXFSZ, SIG_IGN);  // a file size limit is an error of the write that meets it, with words
   CLI::App app{"hexcal: calibration of a Stewart platform by photographs", "hexcal"};
@@ -87,10 +99,12 @@ int main(int argc, char** argv) {
   }
   try {
     app.parse(argc, argv);
+    hexcal::check_numbers(app);
     if (!force) hexcal::allow_overwriting(hexcal::Overwrite::own_results);
     if (quiet && !wants_json(app)) hexcal::silence_words();
     const int code = action();
-    if (std::fflush(stdout) != 0) throw std::system_error(errno, std::generic_category(), "standard output");
+    if (const int error = hexcal::output_error())
+      throw std::system_error(error, std::generic_category(), "standard output");
     return code;
   } catch (const CLI::Success& done) {  // --help, --version
     return app.exit(done);
@@ -100,17 +114,22 @@ int main(int argc, char** argv) {
                words.empty() ? std::string(error.what()) + " (see hexcal --help)" : words);
     return hexcal::kInputError;
   } catch (const hexcal::InputError& error) {
-    fmt::print(stderr, "hexcal: {}\n", hexcal::one_line(error.what()));
+    fmt::print(stderr, "hexcal: {}\n", hexcal::printable_text(error.what()));
     return hexcal::kInputError;
   } catch (const std::filesystem::filesystem_error& error) {  // a folder without permission, a name too long
-    fmt::print(stderr, "hexcal: {}: {}\n", hexcal::one_line(error.path1().string()), error.code().message());
+    fmt::print(stderr, "hexcal: {}: {}\n", hexcal::printable_text(error.path1().string()),
+               error.code().message());
     return hexcal::kInputError;
-  } catch (const std::system_error& error) {  // a full disk behind standard output
-    fmt::print(stderr, "hexcal: {}\n", hexcal::one_line(error.what()));
+  } catch (const std::system_error& error) {
+    if (error.code() == std::errc::resource_unavailable_try_again) return refused_thread(error.what());
+    // A full disk behind standard output
+    fmt::print(stderr, "hexcal: {}\n", hexcal::printable_text(error.what()));
     return hexcal::kInputError;
   } catch (const std::bad_alloc&) {
     return no_memory();
   } catch (const std::exception& error) {
+    if (std::string_view(error.what()).find("pthread_create") != std::string_view::npos)  // TBB's words
+      return refused_thread(error.what());
     const auto* from_opencv = dynamic_cast<const cv::Exception*>(&error);
     if (from_opencv != nullptr && from_opencv->code == cv::Error::StsNoMem) return no_memory();
     fmt::print(stderr,
@@ -118,4 +137,25 @@ int main(int argc, char** argv) {
                error.what());
     return hexcal::kBug;
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  open_closed_streams();
+  hexcal::make_output_printable();
+  // OpenCV and Eigen want more stack than a low limit (ulimit -s) leaves to this thread and to new ones.
+  constexpr std::size_t kStack = std::size_t{8} << 20;
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur >= kStack) return run(argc, argv);
+  pthread_attr_t attributes;
+  if (::pthread_attr_init(&attributes) == 0 && ::pthread_attr_setstacksize(&attributes, kStack) == 0)
+    (void)::pthread_setattr_default_np(&attributes);
+  int code = hexcal::kBug;
+  try {
+    std::thread([&] { code = run(argc, argv); }).join();
+  } catch (const std::system_error& error) {
+    return refused_thread(error.what());
+  }
+  return code;
 }

@@ -12,6 +12,7 @@
 #include "tools/io/camera_file.h"
 #include "tools/io/campaign_file.h"
 #include "tools/io/hexapod_file.h"
+#include "tools/io/measurement_id.h"
 #include "tools/io/observation_table.h"
 #include "tools/io/version.h"
 #include "tools/report/markup.h"
@@ -152,6 +153,9 @@ CampaignReport read_campaign_report(const fs::path& path, const std::string& met
   report.provenance = {{"program", fmt::format("hexcal {}", kVersion)}, {"command", "hexcal report"}};
   if (fs::exists(results / "poses.csv")) {
     inputs.push_back(results / "poses.csv");
+    require_one_measurement(results / "poses.csv",
+                            {results / "poses_covariance.csv", results / "photos.csv",
+                             results / "markers.csv", results / "residuals.csv", results / "quality.json"});
     report.poses = read_pose_table(results / "poses.csv");
     add_compensation(campaign, method, report, inputs);
     add_network(campaign, report);

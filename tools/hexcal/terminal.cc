@@ -9,9 +9,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <map>
-#include <stdexcept>
 
-#include "tools/io/atomic_file.h"
+#include "kinematics/geometry/printable_text.h"
+#include "tools/hexcal/printable_output.h"
 
 namespace hexcal {
 namespace {
@@ -29,15 +29,15 @@ const char* escape(Colour colour) {
     case Colour::plain:
       return "";
     case Colour::good:
-      return "\x1b[32m";
+      return "32m";
     case Colour::warning:
-      return "\x1b[33m";
+      return "33m";
     case Colour::bad:
-      return "\x1b[31m";
+      return "31m";
     case Colour::dim:
-      return "\x1b[2m";
+      return "2m";
     case Colour::bold:
-      return "\x1b[1m";
+      return "1m";
   }
   return "";
 }
@@ -57,13 +57,12 @@ int suggestions_held = 0;
 
 std::string coloured(std::string_view text, Colour colour) {
   if (colour == Colour::plain || !colours_wanted()) return std::string(text);
-  return fmt::format("{}{}\x1b[0m", escape(colour), text);
+  return fmt::format("{0}\x1b[{1}{2}{0}\x1b[0m", kOwnSequence, escape(colour), text);
 }
 
 void silence_words() {
   words_silent = true;
-  if (std::freopen("/dev/null", "w", stdout) == nullptr)
-    throw std::runtime_error("/dev/null cannot be opened");
+  silence_output();
 }
 
 void suggest_next(const std::string& command) {
@@ -108,7 +107,9 @@ ProgressBar::ProgressBar(std::string label, std::size_t total)
 }
 
 ProgressBar::~ProgressBar() {
-  if (shown_) fmt::print(stderr, "\r\x1b[K");
+  if (!shown_) return;
+  fmt::print(stderr, "{0}\r{0}\x1b[K", kOwnSequence);
+  std::fflush(stderr);
 }
 
 void ProgressBar::advance(std::size_t count) {
@@ -126,8 +127,8 @@ void ProgressBar::draw() const {
     left =
         left_s < 60 ? fmt::format("  {:.0f} s left", left_s) : fmt::format("  {:.1f} min left", left_s / 60);
   }
-  fmt::print(stderr, "\r\x1b[K{} [{:#<{}}{: <{}}] {}/{}{}", label_, "", filled, "", kBarWidth - filled, done_,
-             total_, left);
+  fmt::print(stderr, "{0}\r{0}\x1b[K{1} [{2:#<{3}}{4: <{5}}] {6}/{7}{8}", kOwnSequence, label_, "", filled,
+             "", kBarWidth - filled, done_, total_, left);
   std::fflush(stderr);
 }
 
@@ -138,7 +139,7 @@ TextTable::TextTable(std::vector<std::string> header)
 
 void TextTable::add_row(std::vector<std::string> cells, Colour colour) {
   cells.resize(header_.size());
-  for (std::string& cell : cells) cell = one_line(cell);  // names of files may hold anything
+  for (std::string& cell : cells) cell = printable_text(cell);  // names of files may hold anything
   rows_.push_back({std::move(cells), colour});
 }
 

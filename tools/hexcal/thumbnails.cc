@@ -1,14 +1,14 @@
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "kinematics/geometry/input_error.h"
 #include "photogrammetry/photograph/file_signature.h"
-#include "photogrammetry/photograph/input_file.h"
-#include "photogrammetry/photograph/photograph.h"
+#include "photogrammetry/photograph/photograph_file.h"
 #include "tools/hexcal/network_part.h"
 
 namespace hexcal {
@@ -39,18 +39,12 @@ int decoding_flags(int width_px, int wanted_px) {
   return flags | cv::IMREAD_IGNORE_ORIENTATION;
 }
 
-// By its content; a file's name may promise anything.
-bool is_jpeg(const fs::path& path) {
-  std::array<char, 3> head{};
-  InputFile file(path);
-  if (file.is_pipe() || !file.failure().empty()) return false;
-  (void)file.read(head.data(), head.size());
-  return file_signature({head.data(), head.size()}) == FileSignature::jpeg;
-}
-
-cv::Mat decoded(const fs::path& path, int width_px, int wanted_px) {
-  if (is_jpeg(path)) return cv::imread(path.string(), decoding_flags(width_px, wanted_px));
-  const Photograph photograph = read_photograph(path);
+cv::Mat decoded(const PhotographFile& file, int width_px, int wanted_px) {
+  // By its content; a file's name may promise anything.
+  if (file_signature(file.bytes) == FileSignature::jpeg)
+    return cv::imdecode(std::vector<char>(file.bytes.begin(), file.bytes.end()),
+                        decoding_flags(width_px, wanted_px));
+  const Photograph photograph = decode_photograph(file);
   if (photograph.status != PhotographStatus::ok) return {};
   cv::Mat grey = photograph.grey;
   if (grey.depth() != CV_16U) return grey;
@@ -64,12 +58,17 @@ cv::Mat decoded(const fs::path& path, int width_px, int wanted_px) {
 void add_thumbnail(const fs::path& path, int width, PhotographPart& photograph) {
   std::error_code error;
   if (photograph.status.starts_with("unreadable") || !fs::is_regular_file(path, error)) return;
-  const PhotographInfo info = read_photograph_info(path);
-  cv::Mat grey = decoded(path, info.width_px, width);
+  const PhotographFile file = read_photograph_file(path);
+  // A page that lacks what could be read a moment ago would be another page, without a word.
+  if (file.status == PhotographStatus::unreadable)
+    throw InputError(fmt::format("{}: {}", path.string(), file.reason));
+  const PhotographInfo info = photograph_info(file);
+  cv::Mat grey = decoded(file, info.width_px, width);
   if (grey.empty()) return;
   if (info.width_px > 0) photograph.size_px = {info.width_px, info.height_px};
   const double scale = std::min(1.0, static_cast<double>(width) / grey.cols);
-  cv::resize(grey, grey, {}, scale, scale, cv::INTER_AREA);
+  const auto scaled = [scale](int side) { return std::max(1, static_cast<int>(std::lround(scale * side))); };
+  cv::resize(grey, grey, {scaled(grey.cols), scaled(grey.rows)}, 0, 0, cv::INTER_AREA);
   std::vector<unsigned char> bytes;
   cv::imencode(".jpg", grey, bytes, {cv::IMWRITE_JPEG_QUALITY, kThumbnailQuality});
   photograph.thumbnail_jpeg.assign(bytes.begin(), bytes.end());

@@ -18,6 +18,7 @@
 #include <string>
 
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/geometry/printable_text.h"
 #include "photogrammetry/photograph/sha256.h"
 #include "tools/io/output_file.h"
 
@@ -159,19 +160,6 @@ void remove_abandoned_files(const std::filesystem::path& folder, std::string_vie
   }
 }
 
-std::string one_line(std::string_view text) {
-  std::string line;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte < 0x20 || byte == 0x7F) {
-      line += fmt::format("\\x{:02X}", byte);
-    } else {
-      line += c;
-    }
-  }
-  return line;
-}
-
 std::string provenance_line(std::string_view version, std::string_view command,
                             const std::vector<std::filesystem::path>& inputs) {
   std::string line = fmt::format("# hexcal {}  {}", version, command);
@@ -179,7 +167,7 @@ std::string provenance_line(std::string_view version, std::string_view command,
     std::error_code error;
     const bool piped = is_handed_pipe(input);
     if (!piped && !std::filesystem::is_regular_file(input, error)) continue;
-    line += fmt::format("  {} sha256:{}", piped ? "pipe" : one_line(input.filename().string()),
+    line += fmt::format("  {} sha256:{}", piped ? "pipe" : printable_text(input.filename().string()),
                         sha256_hex(read_file(input)));
   }
   return line + "\n";

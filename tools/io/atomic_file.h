@@ -37,9 +37,6 @@ void refuse_linked_folders(const std::filesystem::path& results);
 /// Takes away what writers whose process is gone left behind in a folder, of all files or of one.
 void remove_abandoned_files(const std::filesystem::path& folder, std::string_view of_file = {});
 
-/// Text on one line: control characters, line breaks too, as `\\xNN`.
-[[nodiscard]] std::string one_line(std::string_view text);
-
 /// First comment line of every output: "# hexcal VERSION  COMMAND  NAME sha256:HASH ...". Inputs that do not
 /// exist are left out; names are printed without their folders so that the line does not depend on where the
 /// campaign lies.

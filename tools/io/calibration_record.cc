@@ -9,6 +9,7 @@
 #include "kinematics/geometry/input_error.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/json_text.h"
+#include "tools/io/kept_text.h"
 
 namespace hexcal {
 namespace {
@@ -214,18 +215,21 @@ std::string calibration_record_text(const std::string& key, const CalibrationRep
     out["dropped"].push_back({evaluation.method, evaluation.dropped});
   if (report.fitted.identified && report.identifiability)
     out["identified"] = identified_json(*report.fitted.identified, *report.identifiability);
-  return json_text(out) + "\n";
+  return sealed_json(json_text(out));
 }
 
 std::optional<CalibrationReport> read_calibration_record(const std::filesystem::path& path,
                                                          const std::string& key) {
   if (!std::filesystem::exists(path)) return std::nullopt;
   try {
-    const RecordJson json = RecordJson::parse(read_file(path, ReadFor::own_result));
+    const std::string text = read_file(path, ReadFor::own_result);
+    const auto kept = unsealed_json(text);
+    if (!kept) return std::nullopt;  // an edited or damaged record is made anew
+    const RecordJson json = RecordJson::parse(*kept);
     if (json.at("key").get<std::string>() != key) return std::nullopt;
     return report_of(json);
   } catch (const RecordJson::exception&) {
-    return std::nullopt;  // a damaged record is made anew
+    return std::nullopt;  // of another program
   }
 }
 

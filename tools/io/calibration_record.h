@@ -20,7 +20,8 @@ namespace hexcal {
 /// model.yaml, and the errors that the tables of poses give anew.
 [[nodiscard]] std::string calibration_record_text(const std::string& key, const CalibrationReport& report);
 
-/// Reads such a record; nothing where the file is missing, damaged or of another key.
+/// Reads such a record; nothing where the file is missing, of another key, or differs in a byte from what was
+/// written (kept_text.h).
 [[nodiscard]] std::optional<CalibrationReport> read_calibration_record(const std::filesystem::path& path,
                                                                        const std::string& key);
 

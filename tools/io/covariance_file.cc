@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <set>
+
 #include "tools/io/csv_table.h"
 
 namespace hexcal {
@@ -43,12 +46,15 @@ std::vector<PoseCovariance> read_pose_covariances(const std::filesystem::path& p
   }
   required.insert(required.end(), names.begin(), names.end());
   table.require_columns(required);
+  std::set<std::pair<std::string, std::string>> seen;
   std::vector<PoseCovariance> blocks;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     PoseCovariance block{table.text(row, "pose_a"), table.text(row, "pose_b"), {}};
     for (std::size_t i = 0; i < 36; ++i)
       block.covariance(static_cast<Eigen::Index>(i / 6), static_cast<Eigen::Index>(i % 6)) =
           table.number(row, names[i]);
+    if (!seen.emplace(std::minmax(block.a, block.b)).second)
+      table.fail(row, "pose_a", fmt::format("poses '{}' and '{}' stand together twice", block.a, block.b));
     blocks.push_back(std::move(block));
   }
   return blocks;

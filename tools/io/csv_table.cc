@@ -6,8 +6,10 @@
 #include <algorithm>
 
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/geometry/printable_text.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/csv_dialect.h"
+#include "tools/io/number_range.h"
 #include "tools/io/scalar_text.h"
 
 namespace hexcal {
@@ -16,10 +18,11 @@ namespace {
 // Far beyond any table of ours; a file without commas or line breaks is something else.
 constexpr std::size_t kMaxColumns = 1000;
 constexpr std::size_t kMaxFieldBytes = std::size_t{1} << 20;
+constexpr std::string_view kBlank = " \t";
 
 // Takes one record off `text`, which may span lines inside quotes; counts the lines it took. Stops early at
 // a field or a number of fields that no table has.
-std::vector<std::string> take_record(std::string_view& text, char separator, int& lines) {
+std::vector<std::string> take_record(std::string_view& text, char separator, int& lines, std::string& fault) {
   std::vector<std::string> fields;
   std::string field;
   bool quoted = false;
@@ -27,7 +30,7 @@ std::vector<std::string> take_record(std::string_view& text, char separator, int
   std::size_t i = 0;
   lines = 1;
   const auto finish_field = [&] {
-    fields.push_back(was_quoted ? field : std::string(trimmed(field)));
+    fields.push_back(printable_text(was_quoted ? std::string_view(field) : trimmed(field)));
     field.clear();
     was_quoted = false;
   };
@@ -51,9 +54,11 @@ std::vector<std::string> take_record(std::string_view& text, char separator, int
     } else if (c == '\n') {
       break;
     } else if (c != '\r') {
-      field += c;
+      if (was_quoted && kBlank.find(c) == std::string_view::npos) fault = "text behind a quoted field";
+      if (!was_quoted) field += c;
     }
   }
+  if (quoted && i >= text.size()) fault = "a quote is not closed";
   finish_field();
   text.remove_prefix(std::min(i + 1, text.size()));
   return fields;
@@ -86,12 +91,14 @@ CsvTable CsvTable::parse(std::string_view bytes, const std::filesystem::path& pa
     }
     if (table.columns_.empty()) table.separator_ = csv_separator(first_line);
     int lines = 1;
-    Row row{line, take_record(text, table.separator_, lines)};
+    std::string fault;
+    Row row{line, take_record(text, table.separator_, lines, fault)};
     if (row.fields.size() > kMaxColumns || row.fields.back().size() > kMaxFieldBytes) {
       throw InputError(
           fmt::format("{}:{}: no CSV table: more than {} fields in a line, or one of more than {} bytes",
                       path.string(), line, kMaxColumns, kMaxFieldBytes));
     }
+    if (!fault.empty()) throw InputError(fmt::format("{}:{}: {}", path.string(), line, fault));
     line += lines;
     drop_empty_end(row.fields, table.columns_.empty() ? 1 : table.columns_.size());
     const bool blank =
@@ -151,7 +158,10 @@ double CsvTable::number(std::size_t row, std::string_view column) const {
   const std::string& field = text(row, column);
   const auto value = csv_number(field, separator_);
   if (!value) fail(row, column, fmt::format("'{}' is not a number", field));
-  return *value;
+  std::string fault;
+  const double number = ranged_number(column, *value, fault);
+  if (!fault.empty()) fail(row, column, fault);
+  return number;
 }
 
 std::optional<double> CsvTable::optional_number(std::size_t row, std::string_view column) const {
@@ -169,7 +179,9 @@ int CsvTable::integer(std::size_t row, std::string_view column) const {
 }
 
 std::string csv_field(std::string_view text) {
-  if (text.find_first_of(",\"\r\n") == std::string_view::npos && (text.empty() || text[0] != '#')) {
+  const bool blank_ends = !text.empty() && trimmed(text).size() != text.size();
+  if (!blank_ends && text.find_first_of(",\"\r\n") == std::string_view::npos &&
+      (text.empty() || text[0] != '#')) {
     return std::string(text);
   }
   std::string quoted = "\"";

@@ -12,7 +12,8 @@ namespace hexcal {
 
 /// A CSV table with named columns. Lines that begin with '#' are comments; fields may be quoted; blank lines
 /// and what spreadsheets write (csv_dialect.h: semicolons, tabs, decimal commas, UTF-16, any line ends) are
-/// accepted. All errors are InputError and name file, line and column.
+/// accepted; control characters in a field become printable_text. All errors are InputError and name file,
+/// line and column.
 class CsvTable {
  public:
   [[nodiscard]] static CsvTable read(const std::filesystem::path& path, ReadFor purpose = ReadFor::input);
@@ -50,7 +51,7 @@ class CsvTable {
   std::vector<Row> rows_;
 };
 
-/// A field as it must be written: quoted if it holds a comma, quote or line break.
+/// A field as it must be written: quoted if it holds a comma, quote or line break, or begins or ends blank.
 [[nodiscard]] std::string csv_field(std::string_view text);
 
 }  // namespace hexcal

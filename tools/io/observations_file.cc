@@ -5,10 +5,13 @@
 #include <charconv>
 #include <cmath>
 #include <functional>
+#include <set>
 
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/geometry/printable_text.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/csv_table.h"
+#include "tools/io/number_range.h"
 
 namespace hexcal {
 namespace {
@@ -108,6 +111,9 @@ class Record {
   void take(double& value) {
     take_number(value, "a number");
     if (!std::isfinite(value)) fail("found a number that is not finite");
+    std::string fault;
+    value = ranged_number("", value, fault);
+    if (!fault.empty()) fail(fault);
   }
   void take(bool& value) {
     int number = 0;
@@ -293,9 +299,13 @@ DetectionSet parse_observations(std::string_view text, const std::filesystem::pa
   DetectionSet set;
   record->take(set.family);
   record->take(set.camera_sha256);
+  std::set<std::string> names;
   while ((record = reader.next())) {
     if (record->kind() == "photograph") {
       set.photographs.push_back(photograph_from(*record));
+      const std::string& name = set.photographs.back().name;
+      if (!names.insert(name).second)
+        record->fail(fmt::format("photograph '{}' stands twice", printable_text(name)));
     } else if (record->kind() == "marker") {
       if (set.photographs.empty()) record->fail("a marker before the first photograph");
       set.photographs.back().markers.push_back(marker_from(*record));

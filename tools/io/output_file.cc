@@ -13,6 +13,7 @@
 #include <cstring>
 
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/geometry/printable_text.h"
 #include "photogrammetry/photograph/file_signature.h"
 #include "photogrammetry/photograph/input_file.h"
 #include "photogrammetry/photograph/photograph_format.h"
@@ -133,7 +134,7 @@ void require_writable(const fs::path& target, std::string_view contents) {
   if (!before.own) refuse(target, "is there already and hexcal did not write it");
   if (!same)
     refuse(target, fmt::format("is there already, another file than this one (hexcal {} wrote it)",
-                               one_line(before.command)));
+                               printable_text(before.command)));
 }
 
 OutputFile::OutputFile(const fs::path& path, std::string_view beginning)

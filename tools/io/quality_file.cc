@@ -66,9 +66,10 @@ DatumFrame parse_datum(const Json& json) {
 }  // namespace
 
 std::string quality_text(const CampaignObservations& observations, const CampaignResult& result,
-                         const ImageListing& listing) {
+                         const ImageListing& listing, const std::string& measurement) {
   const AdjustmentResult& adjusted = result.adjusted;
   Json json;
+  json["measurement"] = measurement;
   json["status"] = adjusted.status == AdjustmentStatus::ok ? "ok" : adjusted.reason;
   json["sigma0"] = adjusted.sigma0;
   json["redundancy"] = adjusted.redundancy_total;

@@ -11,9 +11,10 @@
 namespace hexcal {
 
 /// quality.json: everything about a measurement that is no table, and poses and photographs once more; the
-/// output of `hexcal measure --json`. Its schema is tools/hexcal/schema/measure.json.
+/// output of `hexcal measure --json`. Its schema is tools/hexcal/schema/measure.json. `measurement` is its
+/// name (measurement_id.h).
 [[nodiscard]] std::string quality_text(const CampaignObservations& observations, const CampaignResult& result,
-                                       const ImageListing& listing);
+                                       const ImageListing& listing, const std::string& measurement);
 
 /// What a report takes from it.
 struct Quality {

@@ -2,16 +2,20 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <future>
 #include <optional>
+#include <unordered_set>
 
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/geometry/printable_text.h"
 #include "photogrammetry/photograph/input_file.h"
 #include "photogrammetry/photograph/sha256.h"
 #include "tools/io/atomic_file.h"
 #include "tools/io/csv_dialect.h"
+#include "tools/io/number_range.h"
 #include "tools/io/output_file.h"
 #include "tools/io/scalar_text.h"
 
@@ -21,11 +25,13 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kBlock = std::size_t{1} << 22;
+// Ids beyond are not looked for among the others: memory. A hash of 64 bits tells these apart.
+constexpr std::size_t kMostIds = 500'000;
 constexpr std::size_t kLongestLine = std::size_t{1} << 20;
 
 // Splits a line at its separators; quoted fields may hold them. Quotes are taken off, doubled ones within are
-// kept in `unquoted` storage.
-void split(std::string_view line, char separator, std::vector<std::string_view>& fields,
+// kept in `unquoted` storage. False where a quote is not closed, or something stands behind it.
+bool split(std::string_view line, char separator, std::vector<std::string_view>& fields,
            std::vector<std::string>& unquoted) {
   fields.clear();
   unquoted.clear();
@@ -47,12 +53,15 @@ void split(std::string_view line, char separator, std::vector<std::string_view>&
         }
       }
       end = line.find(separator, i);
+      if (i == line.size() ||
+          !trimmed(line.substr(i + 1, end == std::string_view::npos ? end : end - i - 1)).empty())
+        return false;
       unquoted.push_back(std::move(text));
       fields.push_back(unquoted.back());
     } else {
       fields.push_back(trimmed(line.substr(at, end == std::string_view::npos ? end : end - at)));
     }
-    if (end == std::string_view::npos) return;
+    if (end == std::string_view::npos) return true;
     at = end + 1;
   }
 }
@@ -60,6 +69,11 @@ void split(std::string_view line, char separator, std::vector<std::string_view>&
 bool is_content(std::string_view line) {
   const std::string_view text = trimmed(line);
   return !text.empty() && text.front() != '#';
+}
+
+[[noreturn]] void refuse_quotes(const fs::path& path, std::size_t line) {
+  throw InputError(
+      fmt::format("{}:{}: a quote is not closed, or text stands behind it", path.string(), line));
 }
 
 // Where the wanted columns stand.
@@ -76,11 +90,12 @@ Layout layout_of(std::string_view header, const fs::path& path, std::size_t line
   std::vector<std::string> storage;
   Layout layout;
   layout.separator = csv_separator(header);
-  split(header, layout.separator, names, storage);
+  if (!split(header, layout.separator, names, storage)) refuse_quotes(path, line);
   const auto find = [&](const std::string& wanted) {
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      if (names[i] == wanted) return i;
-    }
+    const auto first = std::find(names.begin(), names.end(), wanted);
+    if (first != names.end() && std::find(first + 1, names.end(), wanted) != names.end())
+      throw InputError(fmt::format("{}:{}: column '{}' stands twice", path.string(), line, wanted));
+    if (first != names.end()) return static_cast<std::size_t>(first - names.begin());
     std::string found;
     for (const std::string_view n : names) found += fmt::format("{}{}", found.empty() ? "" : ",", n);
     throw InputError(
@@ -94,6 +109,7 @@ Layout layout_of(std::string_view header, const fs::path& path, std::size_t line
 
 struct Piece {
   std::string out;
+  std::vector<std::pair<std::size_t, std::size_t>> ids;  // hash and line of each
   StreamTally tally;
 };
 
@@ -110,7 +126,7 @@ Piece transformed(std::string_view text, std::size_t first_line, const fs::path&
     const std::string_view row = text.substr(0, end);
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
     if (!is_content(row)) continue;
-    split(row, layout.separator, fields, storage);
+    if (!split(row, layout.separator, fields, storage)) refuse_quotes(path, line);
     if (fields.size() != layout.fields) {
       throw InputError(fmt::format("{}:{}: found {} fields, wanted {} as in the header", path.string(), line,
                                    fields.size(), layout.fields));
@@ -122,12 +138,17 @@ Piece transformed(std::string_view text, std::size_t first_line, const fs::path&
         throw InputError(fmt::format("{}:{}: {}: found '{}', wanted a number", path.string(), line,
                                      transform.columns[k], field));
       }
-      numbers[k] = *number;
+      std::string fault;
+      numbers[k] = ranged_number(transform.columns[k], *number, fault);
+      if (!fault.empty())
+        throw InputError(fmt::format("{}:{}: {}: {}", path.string(), line, transform.columns[k], fault));
     }
-    const std::string_view id = fields[layout.id];
+    const std::string printable_id = printable_text(fields[layout.id]);
+    const std::string_view id = printable_id;
     if (id.empty())
       throw InputError(
           fmt::format("{}:{}: {}: is empty, wanted a pose id", path.string(), line, transform.id_column));
+    piece.ids.push_back({std::hash<std::string_view>{}(id), line});
     ++piece.tally.rows;
     if (!transform.row({id, numbers}, piece.out) && ++piece.tally.failed == 1) piece.tally.first_failed = id;
   }
@@ -205,15 +226,17 @@ StreamTally stream_rows(const fs::path& input, const fs::path& output, const std
                         const RowTransform& transform, int threads) {
   BlockReader in(input);
   remove_abandoned_files(output.has_parent_path() ? output.parent_path() : ".", output.filename().string());
-  OutputFile out(output, fmt::format("{}  {} sha256:{}\n{}", head,
-                                     is_handed_pipe(input) ? "pipe" : one_line(input.filename().string()),
-                                     in.sha256(), transform.header));
+  OutputFile out(output,
+                 fmt::format("{}  {} sha256:{}\n{}", head,
+                             is_handed_pipe(input) ? "pipe" : printable_text(input.filename().string()),
+                             in.sha256(), transform.header));
 
   std::size_t line = 1;
   std::string name;
   bool has_header = false;
   Layout layout;
   StreamTally tally;
+  std::unordered_set<std::size_t> seen;
   std::string block;
   while (true) {
     // What is left of the last block, then whole lines.
@@ -254,6 +277,11 @@ StreamTally stream_rows(const fs::path& input, const fs::path& output, const std
     pieces.back().wait();
     for (std::future<Piece>& piece : pieces) {
       const Piece done = piece.get();
+      for (const auto& [id, at] : done.ids) {
+        if (seen.size() < kMostIds && !seen.insert(id).second)
+          throw InputError(
+              fmt::format("{}:{}: this {} stands twice", input.string(), at, transform.id_column));
+      }
       out.write(done.out);
       if (tally.failed == 0) tally.first_failed = done.tally.first_failed;
       tally.rows += done.tally.rows;

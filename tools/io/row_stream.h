@@ -32,9 +32,9 @@ struct StreamTally {
 
 /// Sends every row of a CSV file (the dialect of csv_table.h) through `transform` into another file. Memory
 /// does not grow with the file; rows keep their order and the output's bytes do not depend on the number of
-/// threads. The output is written to a temporary name and renamed. Ids are not checked for duplicates. `head`
-/// is the output's comment line without its line break; the input's name and SHA-256 are added to it. Throws
-/// InputError naming file, line and column.
+/// threads. The output is written to a temporary name and renamed. An id that stands twice among the first
+/// half million is an error. `head` is the output's comment line without its line break; the input's name and
+/// SHA-256 are added to it. Throws InputError naming file, line and column.
 [[nodiscard]] StreamTally stream_rows(const std::filesystem::path& input, const std::filesystem::path& output,
                                       const std::string& head, const RowTransform& transform, int threads);
 

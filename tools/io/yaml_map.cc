@@ -12,6 +12,7 @@
 #include "kinematics/geometry/nearest_name.h"
 #include "kinematics/geometry/pose.h"
 #include "tools/io/atomic_file.h"
+#include "tools/io/number_range.h"
 #include "tools/io/scalar_text.h"
 
 namespace hexcal {
@@ -78,7 +79,14 @@ YamlMap YamlMap::parse(const std::string& text, const std::filesystem::path& pat
   }
   YAML::Node node;
   try {
-    node = YAML::Load(text);
+    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    for (const YAML::Node& document : documents) {
+      if (!document.IsDefined() || document.IsNull()) continue;  // nothing between two marks
+      if (node.IsDefined() && !node.IsNull())
+        throw InputError(fmt::format("{}: another document begins, wanted one (no --- or ... between keys)",
+                                     place(path, document)));
+      node.reset(document);
+    }
   } catch (const YAML::Exception& error) {
     throw InputError(fmt::format("{}:{}: not valid YAML: {}", path.string(), error.mark.line + 1, error.msg));
   }
@@ -128,7 +136,14 @@ double YamlMap::number(const std::string& key) const {
   const YAML::Node node = require(*this, state_->node, state_->find(key), key, "a number");
   const auto value = node.IsScalar() ? number_from_text(node.Scalar()) : std::nullopt;
   if (!value) fail(key, fmt::format("found {}, wanted a number", shown(node)));
-  return *value;
+  return in_range(key, *value);
+}
+
+double YamlMap::in_range(const std::string& key, double value) const {
+  std::string fault;
+  const double number = ranged_number(key, value, fault);
+  if (!fault.empty()) fail(key, fault);
+  return number;
 }
 
 double YamlMap::number_or(const std::string& key, double fallback) const {
@@ -182,7 +197,7 @@ std::vector<double> YamlMap::numbers(const std::string& key, std::size_t size) c
   for (const auto& entry : node) {
     const auto value = entry.IsScalar() ? number_from_text(entry.Scalar()) : std::nullopt;
     if (!value) fail(key, fmt::format("found {}, wanted a number", shown(entry)));
-    values.push_back(*value);
+    values.push_back(in_range(key, *value));
   }
   return values;
 }
@@ -211,7 +226,7 @@ std::vector<Eigen::Vector3d> YamlMap::vectors3(const std::string& key, std::size
     for (std::size_t i = 0; i < 3; ++i) {
       const auto value = entry[i].IsScalar() ? number_from_text(entry[i].Scalar()) : std::nullopt;
       if (!value) fail(key, fmt::format("found {}, wanted a number", shown(entry[i])));
-      v[static_cast<Eigen::Index>(i)] = *value;
+      v[static_cast<Eigen::Index>(i)] = in_range(key, *value);
     }
     values.push_back(v);
   }

@@ -58,6 +58,8 @@ class YamlMap {
 
  private:
   struct State;
+  // The number as a key of this name may hold it (number_range.h).
+  [[nodiscard]] double in_range(const std::string& key, double value) const;
   explicit YamlMap(std::shared_ptr<State> state) : state_(std::move(state)) {}
   std::shared_ptr<State> state_;
 };

@@ -15,6 +15,27 @@ Vector6d units() {
 
 }  // namespace
 
+pybind11::array_t<double, pybind11::array::c_style | pybind11::array::forcecast> array_in(
+    pybind11::handle source, pybind11::ssize_t rows, pybind11::ssize_t columns) {
+  using Numbers = pybind11::array_t<double, pybind11::array::c_style | pybind11::array::forcecast>;
+  Numbers array = Numbers::ensure(source);
+  const std::string wanted =
+      fmt::format("wanted numbers of shape ({}, {})", rows < 0 ? "N" : std::to_string(rows), columns);
+  if (!array || source.is_none()) {  // numpy makes a NaN of None
+    PyErr_Clear();
+    throw InputError(fmt::format("found {}, {}", Py_TYPE(source.ptr())->tp_name, wanted));
+  }
+  if (rows < 0 && array.ndim() == 1 && array.shape(0) == columns)
+    return array.reshape({pybind11::ssize_t{1}, columns});
+  if (array.ndim() != 2 || array.shape(1) != columns || (rows >= 0 && array.shape(0) != rows)) {
+    std::string found;
+    for (pybind11::ssize_t i = 0; i < array.ndim(); ++i)
+      found += fmt::format("{}{}", i > 0 ? ", " : "", array.shape(i));
+    throw InputError(fmt::format("found an array of shape ({}), {}", found, wanted));
+  }
+  return array;
+}
+
 Vector6d row_of_pose(const Pose& pose) { return to_deg(pose.vector()); }
 Pose pose_of_row(const Vector6d& mm_deg) { return {mm_deg.head<3>(), mm_deg.tail<3>() * kRadPerDeg}; }
 Vector6d to_deg(const Vector6d& mm_rad) { return units().cwiseProduct(mm_rad); }

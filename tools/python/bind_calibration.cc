@@ -25,7 +25,7 @@ void want_rows(Eigen::Index found, Eigen::Index wanted, const char* name) {
 
 ObservationSet observations_of(const RowsIn& measured, const RowsIn& readings,
                                const std::optional<Covariances>& covariances,
-                               const std::optional<Rows6>& targets,
+                               const std::optional<RowsIn>& targets,
                                const std::optional<std::vector<std::string>>& ids) {
   const Eigen::Index n = measured.rows();
   want_rows(readings.rows(), n, "readings");

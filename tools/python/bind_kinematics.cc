@@ -12,8 +12,10 @@ namespace py = pybind11;
 namespace {
 
 using Joints = Eigen::Matrix<double, 6, 3, Eigen::RowMajor>;
+using JointsIn = ArrayIn<6, 3>;
+using MotionIn = ArrayIn<4, 4>;
 
-std::array<Eigen::Vector3d, 6> joints_of(const Joints& rows) {
+std::array<Eigen::Vector3d, 6> joints_of(const JointsIn& rows) {
   std::array<Eigen::Vector3d, 6> joints;
   for (std::size_t i = 0; i < 6; ++i) joints[i] = rows.row(static_cast<Eigen::Index>(i));
   return joints;
@@ -25,13 +27,13 @@ Joints rows_of(const std::array<Eigen::Vector3d, 6>& joints) {
   return rows;
 }
 
-PlatformGeometry machine_of(const Joints& base, const Joints& platform, const Eigen::Matrix4d& B_from_UG,
-                            const Eigen::Matrix4d& P_from_LG, double gd_mm, double min_mm, double max_mm) {
+PlatformGeometry machine_of(const JointsIn& base, const JointsIn& platform, const MotionIn& B_from_UG,
+                            const MotionIn& P_from_LG, double gd_mm, double min_mm, double max_mm) {
   PlatformGeometry geometry;
   geometry.base_joints_mm = joints_of(base);
   geometry.platform_joints_mm = joints_of(platform);
-  geometry.B_from_UG = rigid_of_matrix(B_from_UG, "B_from_UG");
-  geometry.P_from_LG = rigid_of_matrix(P_from_LG, "P_from_LG");
+  geometry.B_from_UG = rigid_of_matrix(B_from_UG.numbers, "B_from_UG");
+  geometry.P_from_LG = rigid_of_matrix(P_from_LG.numbers, "P_from_LG");
   geometry.gd_mm = gd_mm;
   for (Actuator& actuator : geometry.actuators) actuator = {0, 1, min_mm, max_mm};
   // Through the file's own checks, so that no machine gets in that hexapod.yaml would refuse.
