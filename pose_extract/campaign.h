@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "kinematics/geometry/rigid3.h"
+
 namespace hexcal {
 
 /// A corner of a marker, or its centre (corner -1). Written `9.2` and `9`.
@@ -64,6 +66,7 @@ struct FrameRule {
   std::string home_pose;                 ///< From::home: the pose id
   double gd_mm = 0;                      ///< LG: distance O_LG to O_UG at home
   std::optional<FeatureFrame> features;  ///< From::features
+  Rigid3 markers_from_frame;             ///< From::markers: where the frame stands in that of the markers
 };
 
 /// Relative sigma of the scale of a print that nobody measured: a laser printer's feed and the moisture of

@@ -49,8 +49,9 @@ struct DatumFrame {
 /// UG where nothing is known but what the photographs show: origin at the mean of the fixed markers' centres,
 /// z from the mean of the moving ones at home towards it, y away from who stands before the fixed markers
 /// (the side to which they face on average; where they face all around, that of the lowest), x to his right.
+/// Or a frame that stands in that one at markers_from_frame.
 [[nodiscard]] DatumFrame frame_from_markers(const Network& network, const AdjustmentResult& adjusted,
-                                            int home_epoch);
+                                            int home_epoch, const Rigid3& markers_from_frame = {});
 
 /// Frame of the lowest marker of a body: for projects that define none.
 [[nodiscard]] DatumFrame frame_from_first_marker(const Network& network, const AdjustmentResult& adjusted,

@@ -80,7 +80,8 @@ Rigid3 frame_of(const Eigen::Vector3d& fixed, const Eigen::Vector3d& facing, con
 
 }  // namespace
 
-DatumFrame frame_from_markers(const Network& network, const AdjustmentResult& adjusted, int home_epoch) {
+DatumFrame frame_from_markers(const Network& network, const AdjustmentResult& adjusted, int home_epoch,
+                              const Rigid3& markers_from_frame) {
   DatumFrame frame;
   if (home_epoch < 0 || !adjusted.geometry.has_pose[kMovingBody][static_cast<std::size_t>(home_epoch)]) {
     frame.reason = "it is from the markers at home, and the home pose was not measured";
@@ -125,6 +126,12 @@ DatumFrame frame_from_markers(const Network& network, const AdjustmentResult& ad
     frame.by_error.topRows<6>() += by_part * *errors[part];
     if (part == 2) frame.own.topLeftCorner<6, 6>() = by_part * means.moving_own * by_part.transpose();
   }
+  const Rigid3 turned = inverse(markers_from_frame);
+  const Matrix6d by_markers = product_jacobian_right(turned, frame.frame_from_body);
+  frame.frame_from_body = turned * frame.frame_from_body;
+  frame.by_error.topRows<6>() = (by_markers * frame.by_error.topRows<6>()).eval();
+  frame.own.topLeftCorner<6, 6>() =
+      (by_markers * frame.own.topLeftCorner<6, 6>() * by_markers.transpose()).eval();
   frame.ok = true;
   frame.reason.clear();
   return frame;

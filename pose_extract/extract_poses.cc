@@ -91,7 +91,7 @@ DatumFrame body_frame(const CampaignResult& result, const std::optional<FrameRul
     return frame_from_features(result.network, result.adjusted, body, *rule->features);
   }
   if (rule->from == FrameRule::From::markers)
-    return frame_from_markers(result.network, result.adjusted, result.home_epoch);
+    return frame_from_markers(result.network, result.adjusted, result.home_epoch, rule->markers_from_frame);
   return frame_from_nominal(result.network, result.adjusted, body, rule->nominal, with_scale);
 }
 

@@ -98,8 +98,9 @@ bool judge_axes(const std::map<std::string, Pose>& commanded, CampaignResult& re
             "the axes of frame UG in campaign.yaml and those of the targets disagree",
             std::abs(angle_deg - quarters_deg) < kNearQuarterDeg ? quarters_deg : angle_deg, axis.x(),
             axis.y(), axis.z()),
-        "find out which of the two is right and correct frames.UG (its file of nominal coordinates) or the "
-        "targets",
+        "find out which of the two is right and correct frames.UG (its file of nominal coordinates; hexcal "
+        "init "
+        "says what to write for UG from markers) or the targets",
         Severity::bad);
     return true;
   }

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "kinematics/geometry/covariance.h"
+#include "kinematics/geometry/rigid3.h"
 #include "tests/support/run_hexcal.h"
 #include "tests/support/sample_campaign.h"
 #include "tools/io/campaign_file.h"
@@ -81,7 +82,9 @@ TEST(Init, AMemoryCardBecomesPosesWithoutAHandWrittenLine) {
   for (const PoseRecord& pose : measured) EXPECT_EQ(pose.status, "ok") << pose.id;
   const double chi2 = chi2_against_truth(measured, truth);
   EXPECT_LT(chi2, 2) << "in sigmas squared";
-  EXPECT_GT(chi2, 0.2);
+  // The positions' sigmas hold the 0.1 % by which a print may be off; the sample's is exact. Angles know
+  // nothing of it.
+  EXPECT_GT(chi2, 0.1);
 }
 
 class InitWithCamera : public ::testing::Test {
@@ -165,6 +168,23 @@ TEST_F(InitWithCamera, JointsComeFromATableToo) {
   EXPECT_EQ(short_table.exit_code, 2);
   EXPECT_THAT(short_table.err, HasSubstr("11 joints, wanted 12"));
   EXPECT_FALSE(fs::exists(lab_ / "campaign.yaml"));
+}
+
+// UG from markers alone knows nothing of the machine's axes; the commanded poses do.
+TEST_F(InitWithCamera, TargetsTellWhereTheFrameStands) {
+  for (const char* pose : {"p003", "p004", "p005", "p006", "p007", "p008"})
+    fs::copy(kInitSample / "poses" / pose, lab_ / "poses" / pose);
+  fs::copy(kInitSample / "targets.csv", lab_);
+  fs::copy(kInitSample / "hexapod.yaml", lab_);
+  const CommandResult made = init();
+  ASSERT_EQ(made.exit_code, 0) << made.out << made.err;
+  EXPECT_THAT(made.out, HasSubstr("frame UG agrees best with targets.csv"));
+  EXPECT_GT(rotation_distance(read_campaign(lab_).ug->markers_from_frame.rotation, Rigid3().rotation), 1);
+  const CommandResult run = run_hexcal({"run", lab_.string()});
+  EXPECT_EQ(run.exit_code, 0) << run.out << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("* kinematic"), HasSubstr("to the controller")));
+  const CommandResult again = init();
+  EXPECT_THAT(again.out, HasSubstr("agrees best with the targets: UG: {from: markers, xyz_mm: ["));
 }
 
 // One number has no proposal; Enter takes the others.

@@ -141,6 +141,9 @@ TEST_F(ExtractPoses, UgFromMarkersNeedsNoCoordinates) {
     options.seed = seed;
     CampaignScene made = make_campaign_scene(options);
     made.campaign.ug->from = FrameRule::From::markers;
+    const Rigid3 markers_from_frame =
+        seed % 2 == 0 ? Rigid3() : Rigid3(quaternion_from_rpy({0.1, -0.2, 1.5}), {5, -3, 8});
+    made.campaign.ug->markers_from_frame = markers_from_frame;
     const CampaignResult result = extract_poses(made.campaign, made.observations);
     ASSERT_TRUE(result.UG.ok) << result.UG.reason;
     // The same frame from the true geometry.
@@ -161,7 +164,7 @@ TEST_F(ExtractPoses, UgFromMarkersNeedsNoCoordinates) {
     axes.col(0) = axes.col(2).cross(facing).normalized();
     axes.col(1) = axes.col(2).cross(axes.col(0));
     EXPECT_LT(axes.col(1).dot(facing), 0);  // the markers face -y
-    const Rigid3 ug_from_fixed = inverse(Rigid3(axes, fixed));
+    const Rigid3 ug_from_fixed = inverse(markers_from_frame) * inverse(Rigid3(axes, fixed));
     for (std::size_t e = 1; e < 5; ++e) {
       ASSERT_TRUE(result.poses[e].pose) << result.poses[e].words;
       const auto in_ug = [&](std::size_t epoch) {

@@ -14,13 +14,17 @@
 namespace hexcal {
 namespace fs = std::filesystem;
 OpenCampaign open_campaign(const MeasureRequest& request) {
+  return open_campaign(request, read_campaign(request.campaign));
+}
+
+OpenCampaign open_campaign(const MeasureRequest& request, Campaign of) {
   constexpr int kMostThreads = 256;
   if (request.threads < 0 || request.threads > kMostThreads)
     throw InputError(
         fmt::format("threads: found {}, wanted 0 (all processors) to {}", request.threads, kMostThreads));
   OpenCampaign open;
   open.opened = fs::file_time_type::clock::now();
-  open.campaign = read_campaign(request.campaign);
+  open.campaign = std::move(of);
   if (request.home) {
     if (!open.campaign.lg || open.campaign.lg->from != FrameRule::From::home) {
       throw InputError(fmt::format("--home {}: found, but frames.LG of {} is not from home", *request.home,

@@ -44,6 +44,9 @@ struct OpenCampaign {
 /// in them.
 [[nodiscard]] OpenCampaign open_campaign(const MeasureRequest& request);
 
+/// The same of a campaign that was read, or is to be written.
+[[nodiscard]] OpenCampaign open_campaign(const MeasureRequest& request, Campaign of);
+
 /// The campaign's camera that a photograph in camera folder `folder` (empty: in none) with these EXIF entries
 /// is for: that of the folder, else that of the body's serial number, else one that is for all. Of several
 /// (one per zoom setting) the first whose image size and lens setting fit. -1: none.

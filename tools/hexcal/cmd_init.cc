@@ -8,6 +8,7 @@
 #include <set>
 
 #include "kinematics/geometry/input_error.h"
+#include "tools/campaign/align_campaign.h"
 #include "tools/campaign/propose_campaign.h"
 #include "tools/hexcal/commands.h"
 #include "tools/hexcal/init_files.h"
@@ -96,12 +97,14 @@ class NewFiles {
       files_.emplace_back(folder_ / name, std::move(text));
     }
   }
-  void write() const {
+  void write() {
     write_files_atomically(files_);
     std::vector<fs::path> written;
     for (const auto& [path, text] : files_) written.push_back(path);
     if (!written.empty()) fmt::print("{}", written_line(written));
     if (!kept_.empty()) fmt::print("kept as they are: {}\n", fmt::join(kept_, ", "));
+    files_.clear();
+    kept_.clear();
   }
 
  private:
@@ -234,7 +237,7 @@ void refuse_nonsense(const fs::path& folder) {
 }
 
 // A campaign.yaml that is there stays; what the photographs say otherwise is said.
-int complete_campaign(const InitFlags& flags, const CampaignProposal& found, const NewFiles& files) {
+int complete_campaign(const InitFlags& flags, const CampaignProposal& found, NewFiles& files) {
   const Campaign campaign = read_campaign(flags.folder);
   files.write();
   const auto ids = [](const MarkerSizes& sizes) {
@@ -250,11 +253,15 @@ int complete_campaign(const InitFlags& flags, const CampaignProposal& found, con
     fmt::print("{} campaign.yaml has {}: fixed {}; moving {}\n", coloured("note", Colour::warning),
                campaign.family, id_ranges_text(ids(campaign.fixed)), id_ranges_text(ids(campaign.moving)));
   }
+  if (campaign.ug && campaign.ug->from == FrameRule::From::markers && campaign.targets) {
+    if (const auto aligned = align_campaign(campaign))
+      fmt::print("agrees best with the targets: {}\n", markers_frame_text(aligned->measured_from_targets));
+  }
   suggest_next("hexcal run " + shell_word(flags.folder.string()));
   return same ? kDone : kSomeFailed;
 }
 
-int wait_for_more(const InitFlags& flags, const CampaignProposal& found, const NewFiles& files) {
+int wait_for_more(const InitFlags& flags, const CampaignProposal& found, NewFiles& files) {
   files.write();
   const auto put = [&flags](const char* what, const char* where) {
     fmt::print("put {} into {}, then init again\n", what, (flags.folder / where).string());
@@ -320,6 +327,14 @@ int run_init(const InitFlags& flags) {
   draft.legs = files.there("legs.csv");
   if (!draft.targets) files.add("targets.csv", targets_template(head(), found.poses, draft.home));
   if (draft.images_table) files.add("images.csv", images_table_text(head(), found.table));
+  files.write();
+  if (draft.targets && !draft.nominal && !draft.moving.empty()) {
+    const Campaign campaign = parse_campaign(campaign_text(head(), draft), flags.folder / "campaign.yaml");
+    if (const auto aligned = align_campaign(campaign)) {
+      draft.markers_from_UG = aligned->measured_from_targets;
+      fmt::print("frame UG agrees best with targets.csv; {:.2g} deg rms remain\n", aligned->rms_deg);
+    }
+  }
   files.add("campaign.yaml", campaign_text(head(), draft));
   files.write();
   (void)read_campaign(flags.folder);

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "kinematics/geometry/input_error.h"
+#include "kinematics/geometry/pose.h"
 #include "tools/io/csv_table.h"
 #include "tools/io/scalar_text.h"
 #include "tools/io/yaml_map.h"
@@ -124,6 +125,9 @@ FrameRule read_frame(const YamlMap& frames, const std::string& name, const std::
     rule.home_pose = map.text("pose");
   } else if (from == "markers") {
     rule.from = FrameRule::From::markers;
+    if (map.has("xyz_mm")) rule.markers_from_frame.translation = map.vector3("xyz_mm");
+    if (map.has("rpy_deg"))
+      rule.markers_from_frame.rotation = quaternion_from_rpy(map.vector3("rpy_deg") * kRadPerDeg);
   } else {
     rule.from = FrameRule::From::features;
     rule.features = FeatureFrame{read_feature(map, "z"), read_feature(map, "x"), read_feature(map, "origin"),
@@ -219,13 +223,13 @@ std::optional<std::filesystem::path> optional_path(const YamlMap& top, const std
 
 }  // namespace
 
-Campaign read_campaign(const std::filesystem::path& folder_or_file) {
+namespace {
+
+Campaign campaign_from_yaml(const YamlMap& top, const std::filesystem::path& file) {
   Campaign campaign;
-  campaign.file =
-      std::filesystem::is_directory(folder_or_file) ? folder_or_file / "campaign.yaml" : folder_or_file;
-  campaign.folder = campaign.file.parent_path();
+  campaign.file = file;
+  campaign.folder = file.parent_path();
   const std::filesystem::path& folder = campaign.folder;
-  const YamlMap top = YamlMap::read(campaign.file);
 
   campaign.cameras = read_cameras(top, folder);
   campaign.hexapod = optional_path(top, "hexapod", folder);
@@ -264,6 +268,18 @@ Campaign read_campaign(const std::filesystem::path& folder_or_file) {
   check_points_known(top, "checks", campaign, campaign.checks);
   top.finish();
   return campaign;
+}
+
+}  // namespace
+
+Campaign read_campaign(const std::filesystem::path& folder_or_file) {
+  const std::filesystem::path file =
+      std::filesystem::is_directory(folder_or_file) ? folder_or_file / "campaign.yaml" : folder_or_file;
+  return campaign_from_yaml(YamlMap::read(file), file);
+}
+
+Campaign parse_campaign(const std::string& text, const std::filesystem::path& file) {
+  return campaign_from_yaml(YamlMap::parse(text, file), file);
 }
 
 std::vector<NominalPoint> read_nominal_points(const std::filesystem::path& path) {

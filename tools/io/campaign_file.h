@@ -19,7 +19,8 @@ namespace hexcal {
 ///   markers                 {family, fixed: {ids, size_mm}, moving: {ids, size_mm}};
 ///                           ids: [0-9, 12] or a map {100: 24, 101: 12} of sizes
 ///   frames.UG, frames.LG    {from: nominal, file},
-///                           {from: markers} (UG only: no coordinates, see frame_from_markers),
+///                           {from: markers, xyz_mm, rpy_deg} (UG only: no coordinates, see
+///                           frame_from_markers; both optional),
 ///                           {from: home, pose, gd_mm} (LG only), or
 ///                           {from: features, z: {plane: [..]}, x: {line: [..]}, origin: {circle: [..]},
 ///                            offset_mm: [0, 0, 0], tolerance_mm}
@@ -29,6 +30,9 @@ namespace hexcal {
 ///                           bars beside another source are compared with it
 ///   checks                  [{a: 0, b: 5, length_mm: 182.41, sigma_mm: 0.01}]: compared, never used
 [[nodiscard]] Campaign read_campaign(const std::filesystem::path& folder_or_file);
+
+/// The same of a text that is to be `file`.
+[[nodiscard]] Campaign parse_campaign(const std::string& text, const std::filesystem::path& file);
 
 /// Nominal coordinates: id,corner,x_mm,y_mm,z_mm[,sigma_mm]; an empty corner is the marker's centre, an empty
 /// sigma_mm (zero in the result) is left to the fit to tell.

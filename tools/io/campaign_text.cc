@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
+
+#include "kinematics/geometry/pose.h"
 
 namespace hexcal {
 namespace {
@@ -50,6 +53,18 @@ std::string id_ranges_text(const std::vector<int>& ids) {
   return text;
 }
 
+std::string markers_frame_text(const std::optional<Rigid3>& markers_from_UG) {
+  if (!markers_from_UG) return "UG: {from: markers}";
+  const auto triple = [](const Eigen::Vector3d& v, int decimals) {
+    const Eigen::Vector3d clean = v.unaryExpr([](double x) { return std::abs(x) < 5e-5 ? 0.0 : x; });
+    return fmt::format("[{:.{}f}, {:.{}f}, {:.{}f}]", clean.x(), decimals, clean.y(), decimals, clean.z(),
+                       decimals);
+  };
+  return fmt::format("UG: {{from: markers, xyz_mm: {}, rpy_deg: {}}}",
+                     triple(markers_from_UG->translation, 2),
+                     triple(rpy_from_quaternion(markers_from_UG->rotation) * kDegPerRad, 3));
+}
+
 std::string campaign_text(const std::string& head, const CampaignDraft& draft) {
   std::string text = head;
   text += "# Lengths in mm, angles in deg. Every key: tools/io/FORMATS.md, or man hexcal-formats.\n";
@@ -74,12 +89,16 @@ std::string campaign_text(const std::string& head, const CampaignDraft& draft) {
   if (!draft.moving.empty()) {
     text += line("  moving: " + body(draft.moving), "");
     text += "frames:\n";
-    text += draft.nominal
-                ? line("  UG: {from: nominal, file: markers_nominal.csv}", "best fit to known coordinates")
-                : line("  UG: {from: markers}",
-                       "needs no coordinates: z from the moving to the fixed markers at");
-    if (!draft.nominal)
-      text += line("", "home, y away from who stands before them, origin amid the fixed ones");
+    if (draft.nominal) {
+      text += line("  UG: {from: nominal, file: markers_nominal.csv}", "best fit to known coordinates");
+    } else {
+      text +=
+          "  # UG needs no coordinates: z from the moving to the fixed markers at home, y away from who "
+          "stands\n"
+          "  # before them, origin amid the fixed ones";
+      text += draft.markers_from_UG ? "; moved and turned to agree best with targets.csv\n" : "\n";
+      text += "  " + markers_frame_text(draft.markers_from_UG) + "\n";
+    }
     text +=
         line(fmt::format("  LG: {{from: home, pose: {}, gd_mm: {}}}", quoted_yaml(draft.home), draft.gd_mm),
              "zero at home, where LG stands gd below UG");
