@@ -14,7 +14,10 @@
 namespace hexcal {
 namespace fs = std::filesystem;
 OpenCampaign open_campaign(const MeasureRequest& request) {
-  return open_campaign(request, read_campaign(request.campaign));
+  const auto before_reading = fs::file_time_type::clock::now();
+  OpenCampaign open = open_campaign(request, read_campaign(request.campaign));
+  open.opened = before_reading;
+  return open;
 }
 
 OpenCampaign open_campaign(const MeasureRequest& request, Campaign of) {
