@@ -30,6 +30,33 @@ struct FeaturePoints {
   std::optional<Eigen::Vector3d> towards;
 };
 
+// Sigma of each point in the shape of its feature: a shift and a scale that all of its points share (a print
+// whose scale nobody measured) take none of them off it.
+std::vector<double> shape_sigmas(const std::vector<Eigen::Vector3d>& points,
+                                 const std::vector<Eigen::Matrix3Xd>& by_error) {
+  std::vector<double> sigmas;
+  if (points.empty()) return sigmas;
+  const double n = static_cast<double>(points.size());
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  Eigen::Matrix3Xd shift = Eigen::Matrix3Xd::Zero(3, by_error[0].cols());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    centre += points[i] / n;
+    shift += by_error[i] / n;
+  }
+  Eigen::RowVectorXd scale = Eigen::RowVectorXd::Zero(shift.cols());
+  double extent = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    scale += (points[i] - centre).transpose() * (by_error[i] - shift);
+    extent += (points[i] - centre).squaredNorm();
+  }
+  if (extent > 0) scale /= extent;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double squares = (by_error[i] - shift - (points[i] - centre) * scale).squaredNorm();
+    sigmas.push_back(std::sqrt(std::max(1e-10, squares / 3)));
+  }
+  return sigmas;
+}
+
 FeaturePoints gather(const Network& network, const AdjustmentResult& adjusted, int body,
                      const Feature& feature) {
   FeaturePoints out;
@@ -37,11 +64,9 @@ FeaturePoints gather(const Network& network, const AdjustmentResult& adjusted, i
   std::vector<Eigen::Vector3d> points;
   std::vector<Eigen::Vector3d> normals;
   std::vector<Eigen::Vector3d> centres;
-  std::vector<double> sigmas;
   const auto add = [&](int marker, const MarkerPoint& name, bool single) {
     EstimatedPoint estimate = adjusted.point(marker, name.corner);
     points.push_back(estimate.in_body);
-    sigmas.push_back(std::sqrt(std::max(1e-10, estimate.covariance().trace() / 3)));
     normals.emplace_back(
         adjusted.geometry.body_from_feature[static_cast<std::size_t>(marker)].rotation_matrix().col(2));
     centres.push_back(name.corner >= 0 && single ? points.back() : adjusted.point(marker).in_body);
@@ -64,6 +89,7 @@ FeaturePoints gather(const Network& network, const AdjustmentResult& adjusted, i
   out.normals.resize(3, static_cast<Eigen::Index>(points.size()));
   out.centres.resize(3, static_cast<Eigen::Index>(points.size()));
   out.sigma_mm.resize(static_cast<Eigen::Index>(points.size()));
+  const std::vector<double> sigmas = shape_sigmas(points, out.by_error);
   for (std::size_t i = 0; i < points.size(); ++i) {
     out.points.col(static_cast<Eigen::Index>(i)) = points[i];
     out.normals.col(static_cast<Eigen::Index>(i)) = normals[i];

@@ -18,7 +18,7 @@ import time
 PATIENCE_S = 60  # the slowest call of the table takes about 2 s on a machine with nothing else to do
 NO_NUMBER = re.compile(rb"(?<![\w./-])[-+]?(?:nan|inf|infinity)(?![\w./-])", re.IGNORECASE)
 NOT_FINITE = re.compile(rb"(?<=[,:\[ ])-?(?:nan|inf|infinity)(?=[,\]}\n])", re.IGNORECASE)
-QUOTED = re.compile(rb"'[^'\n]*'|found \S+")
+QUOTED = re.compile(rb"'[^'\n]*'|(?:found|Value) \S+")
 CONTROL = re.compile(rb"[\x00-\x08\x0b-\x1f\x7f]")
 TEXT_FILES = (".csv", ".json", ".yaml", ".yml", ".txt", ".html", ".svg", ".ply", ".pcd")
 

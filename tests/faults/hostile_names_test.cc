@@ -59,7 +59,8 @@ TEST_F(HostileNames, NoUtf8LineBreaksBlanksAndDashes) {
   fs::rename(lab_.folder() / "camera.yaml",
              lab_.folder() / "cam\nera \xC3\xA9.yaml");  // YAML holds UTF-8 only
   lab_.replace("campaign.yaml", "camera: camera.yaml", "camera: \"cam\\nera \\xE9.yaml\"");
-  measure_and_read({"home", "caf\xE9 \xFF", "two\nlines, \"quoted\"", "--json"});
+  // Control characters of names are written out as they enter a table.
+  measure_and_read({"home", "caf\xE9 \xFF", "two\\x0Alines, \"quoted\"", "--json"});
   // One comment line, however the inputs are called.
   const std::string table = contents(lab_.folder() / "results" / "poses.csv");
   EXPECT_THAT(table.substr(0, table.find('\n')), HasSubstr("cam\\x0Aera \xC3\xA9.yaml sha256:"));

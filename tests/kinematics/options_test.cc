@@ -43,7 +43,7 @@ TEST(KinematicsOptions, OfAWorkspaceAreRefusedByName) {
                                       [](auto& o) { o.u_low = o.u_high + 1; });
   expect_option_refused<SliceOptions>("u_count and v_count must be at least 1",
                                       [](auto& o) { o.v_count = 0; });
-  expect_option_refused<SliceOptions>("SliceOptions.threads must be at least 1",
+  expect_option_refused<SliceOptions>("SliceOptions.threads must be 1 to 256",
                                       [](auto& o) { o.threads = 0; });
   expect_option_refused<BoxOptions>("BoxOptions.grid must be at least 2", [](auto& o) { o.grid = 1; });
   expect_option_refused<BoxOptions>("BoxOptions.rpy_rad is not finite",
