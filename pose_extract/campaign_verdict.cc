@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "kinematics/geometry/chi_squared.h"
 #include "pose_extract/pose_verdict.h"
 
 namespace hexcal {
@@ -166,7 +167,11 @@ void judge_slips(CampaignResult& result) {
 
 void judge_residuals(CampaignResult& result) {
   const double sigma0 = result.adjusted.sigma0;
-  if (sigma0 > kSuspectSigma0) {
+  constexpr double kByChance = 1e-3;
+  const AdjustmentResult& adjusted = result.adjusted;
+  const bool confirmed = adjusted.interior_dof > 0 && !adjusted.interior_loosened &&
+                         adjusted.interior_chi2 < chi2_quantile(adjusted.interior_dof, kByChance);
+  if (sigma0 > (confirmed ? kSuspectSigma0OfAConfirmedCamera : kSuspectSigma0)) {
     result.findings.emplace_back(
         fmt::format(
             "residuals are {:.1f} times what the photographs promise: the camera file is not of this lens "
