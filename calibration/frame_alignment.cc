@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "kinematics/forward.h"
+#include "kinematics/geometry/nearest_rotation.h"
 
 namespace hexcal {
 namespace {
@@ -14,12 +15,6 @@ struct Pair {
   Rigid3 UG_from_LG;  // measured, in the unknown frames
   bool full;
 };
-
-Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& m) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1.0 : 1.0;
-  return svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
-}
 
 // R_P R_X = R_Y R_M for all poses: vec(R_X), vec(R_Y) are the leading singular vectors of sum R_M (x) R_P.
 // False when the poses turn about fewer than two axes.

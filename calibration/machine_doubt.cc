@@ -4,7 +4,6 @@
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,6 +11,7 @@
 
 #include "calibration/free_parameters.h"
 #include "calibration/suspect_conventions.h"
+#include "kinematics/dh_chain.h"
 #include "kinematics/forward.h"
 
 namespace hexcal {
@@ -103,23 +103,14 @@ IdentifyOptions misfit_options(Frames frames) {
 
 // LG on the platform where the nominal machine's legs see it at the measured poses.
 std::optional<Rigid3> seen_P_from_LG(const PlatformGeometry& nominal, const ObservationSet& observations) {
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Zero();
-  int count = 0;
+  std::vector<Rigid3> seen;
   for (const PoseObservation& pose : observations.poses) {
     const ForwardResult solved = forward_kinematics(nominal, lengths_from_readings(nominal, pose.readings));
     if (solved.status != ForwardStatus::converged) continue;
-    const Rigid3 P_from_LG =
-        inverse(*solved.B_from_P) * nominal.B_from_UG * ug_from_lg(pose.measured, nominal.gd_mm);
-    translation += P_from_LG.translation;
-    rotation += P_from_LG.rotation_matrix();
-    ++count;
+    seen.push_back(inverse(*solved.B_from_P) * nominal.B_from_UG * ug_from_lg(pose.measured, nominal.gd_mm));
   }
-  if (count == 0) return std::nullopt;
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d nearest = svd.matrixU() * svd.matrixV().transpose();
-  if (nearest.determinant() < 0) return std::nullopt;
-  return Rigid3(nearest, translation / count);
+  if (seen.empty()) return std::nullopt;
+  return mean_motion(seen);
 }
 
 std::optional<Misfit> misfit_of(const PlatformGeometry& nominal, const ObservationSet& observations,
@@ -300,7 +291,7 @@ std::string absurdity(const DoubtRequest& request, const std::optional<Misfit>& 
   return "";
 }
 
-// Residuals far beyond their sigmas, or frames that the joints had to follow.
+// Whether a slip is worth looking for: a misfit of no usual machine, or residuals far beyond their sigmas.
 bool notable(const DoubtRequest& request, double misfit) {
   if (misfit < kHarmlessMisfit) return false;
   if (misfit > kPlausibleMisfit) return true;

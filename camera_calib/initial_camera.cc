@@ -2,9 +2,10 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+
+#include "kinematics/geometry/nearest_rotation.h"
 
 namespace hexcal {
 namespace {
@@ -149,12 +150,7 @@ Rigid3 pose_from_homography(const Eigen::Matrix3d& image_from_sheet, const Camer
   if (m(2, 2) < 0) m = -m;
   Eigen::Matrix3d r;
   r << m.col(0), m.col(1), m.col(0).cross(m.col(1));
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(r, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
-  if (rotation.determinant() < 0) {
-    rotation = svd.matrixU() * Eigen::Vector3d(1, 1, -1).asDiagonal() * svd.matrixV().transpose();
-  }
-  return {rotation, m.col(2)};
+  return {nearest_rotation(r), m.col(2)};
 }
 
 CalibrationState initial_state(const std::vector<Sheet>& sheets,

@@ -1,8 +1,9 @@
 #include "kinematics/dh_chain.h"
 
-#include <Eigen/SVD>
 #include <cassert>
 #include <cmath>
+
+#include "kinematics/geometry/nearest_rotation.h"
 
 namespace hexcal {
 namespace {
@@ -129,10 +130,7 @@ Eigen::Quaterniond mean_rotation(std::span<const Rigid3> motions) {
   assert(!motions.empty());
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (const Rigid3& motion : motions) sum += motion.rotation_matrix();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d u = svd.matrixU();
-  if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) = -u.col(2);
-  return Eigen::Quaterniond(Eigen::Matrix3d(u * svd.matrixV().transpose())).normalized();
+  return Eigen::Quaterniond(nearest_rotation(sum)).normalized();
 }
 
 Rigid3 mean_motion(std::span<const Rigid3> motions) {

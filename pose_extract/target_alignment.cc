@@ -4,6 +4,8 @@
 #include <Eigen/SVD>
 #include <cmath>
 
+#include "kinematics/geometry/nearest_rotation.h"
+
 namespace hexcal {
 namespace {
 
@@ -30,11 +32,9 @@ std::optional<TargetAlignment> align_with_targets(
              rotation_vector_from_quaternion(commanded.back().rotation).transpose();
   }
   const auto count = static_cast<double>(commanded.size());
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross);
   if (std::sqrt(svd.singularValues()[1] / count) < kLeastSecondTurn) return std::nullopt;
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  const Eigen::Matrix3d turn =
-      svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
+  const Eigen::Matrix3d turn = nearest_rotation(cross);
   // t_measured = turn t_commanded + (1 - R_measured) shift.
   Eigen::MatrixXd a(static_cast<Eigen::Index>(3 * commanded.size()), 3);
   Eigen::VectorXd b(a.rows());

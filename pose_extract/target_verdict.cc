@@ -1,11 +1,11 @@
 #include <fmt/format.h>
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <set>
 
 #include "kinematics/geometry/nearest_name.h"
+#include "kinematics/geometry/nearest_rotation.h"
 #include "pose_extract/pose_verdict.h"
 
 namespace hexcal {
@@ -61,9 +61,7 @@ Motions motions_of(const std::vector<Pose>& poses) {
 // Rotation (or, `mirrored`, rotation with a reflection) that takes the columns of `from` nearest to those of
 // `to` (Kabsch 1976).
 Eigen::Matrix3d best_turn(const Eigen::Matrix3d& to_from, bool mirrored) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(to_from, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() * (mirrored ? -1.0 : 1.0);
-  return svd.matrixU() * Eigen::Vector3d(1, 1, sign < 0 ? -1 : 1).asDiagonal() * svd.matrixV().transpose();
+  return mirrored ? Eigen::Matrix3d(-nearest_rotation(-to_from)) : nearest_rotation(to_from);
 }
 
 // True if targets and measured poses are the same motions seen from axes that are turned or mirrored.
