@@ -175,13 +175,14 @@ class Identification {
 
   bool linearize() {
     result_.machine = corrected_machine(nominal_, result_.layout, result_.corrections, result_.stroke_range);
+    legs_.clear();
     reduced_.clear();
     for (std::size_t i = 0; i < observations_.poses.size(); ++i) {
       const PoseObservation& pose = observations_.poses[i];
       fill_missing(i);
-      const LegLinearization legs =
-          linearize_legs(result_.machine, nominal_, result_.layout, result_.stroke_range, filled_[i],
-                         pose.readings, pose.approach);
+      const LegLinearization& legs =
+          legs_.emplace_back(linearize_legs(result_.machine, nominal_, result_.layout, result_.stroke_range,
+                                            filled_[i], pose.readings, pose.approach));
       if (!legs.residuals_mm.allFinite() || !legs.jacobian.allFinite()) {
         result_.reason = fmt::format("pose {}: its legs have no finite lengths there", pose.id);
         return false;
@@ -360,15 +361,11 @@ class Identification {
     double orientation = 0;
     const double n = static_cast<double>(observations_.poses.size());
     for (std::size_t i = 0; i < observations_.poses.size(); ++i) {
-      const PoseObservation& pose = observations_.poses[i];
       const Matrix6d noise = pose_covariance(observations_, i, noise_);
       position += noise.diagonal().head<3>().sum() / (3 * n);
       orientation += noise.diagonal().tail<3>().sum() / (3 * n);
-      const LegLinearization legs =
-          linearize_legs(result_.machine, nominal_, result_.layout, result_.stroke_range, filled_[i],
-                         pose.readings, pose.approach);
-      result_.leg_residuals_mm.push_back(legs.residuals_mm);
-      result_.pose_residuals.emplace_back(legs.by_pose.partialPivLu().solve(legs.residuals_mm));
+      result_.leg_residuals_mm.push_back(legs_[i].residuals_mm);
+      result_.pose_residuals.emplace_back(legs_[i].by_pose.partialPivLu().solve(legs_[i].residuals_mm));
       result_.influence.push_back(equations_.information_of_pose[i].cwiseProduct(covariance_).sum() /
                                   std::max(1e-300, result_.effective_parameters));
     }
@@ -391,16 +388,11 @@ class Identification {
     for (int k = 0; k < 6; ++k)
       frame_only.free_of[static_cast<std::size_t>(ParameterLayout::kBaseFrame + k)] = k;
     for (std::size_t i = 0; i < n; ++i) {
-      const PoseObservation& pose = observations_.poses[i];
-      const LegLinearization legs =
-          linearize_legs(result_.machine, nominal_, result_.layout, result_.stroke_range, filled_[i],
-                         pose.readings, pose.approach);
       ReducedPose reduced = reduced_[i];
       const double order = 2 * static_cast<double>(i) / static_cast<double>(n - 1) - 1;
-      const Eigen::Index m = reduced.residuals.size();
       reduced.jacobian.conservativeResize(Eigen::NoChange, free_count() + 6);
       reduced.jacobian.rightCols<6>() =
-          order * reduce_to_observed(legs, pose.observed, frame_only).jacobian.topRows(m);
+          order * reduce_to_observed(legs_[i], observations_.poses[i].observed, frame_only).jacobian;
       extended.push_back(std::move(reduced));
     }
     const NormalEquations all = normal_equations(extended, observations_, result_.weights, noise_);
@@ -429,6 +421,7 @@ class Identification {
   Eigen::VectorXd initial_tolerances_;
   Eigen::VectorXd frame_steps_;
   std::vector<Pose> filled_;
+  std::vector<LegLinearization> legs_;
   std::vector<ReducedPose> reduced_;
   NormalEquations equations_;
   Eigen::MatrixXd covariance_;

@@ -157,10 +157,8 @@ NormalEquations normal_equations(const std::vector<ReducedPose>& reduced, const 
     sums.gradient.noalias() += white.transpose() * weighted_residuals;
     sums.squares += weighted_residuals.squaredNorm();
     if (!request.components) continue;
-    {
-      const SmallMatrix factor = llt.matrixL().solve(noise.leg_sigma_mm * SmallMatrix::Identity(m, m));
-      add_component(sums.leg, leg_information, factor, weighted_residuals, white, weights[i]);
-    }
+    const SmallMatrix leg_factor = llt.matrixL().solve(noise.leg_sigma_mm * SmallMatrix::Identity(m, m));
+    add_component(sums.leg, leg_information, leg_factor, weighted_residuals, white, weights[i]);
     if (!observations.covariance_known) {
       const SmallMatrix factor =
           llt.matrixL().solve(SmallMatrix(pose.by_pose * noise_of_pose.diagonal().cwiseSqrt().asDiagonal()));
