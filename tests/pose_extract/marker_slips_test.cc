@@ -70,8 +70,7 @@ TEST_P(Bumps, AreNamedAndNoPoseThatIsOkIsWrong) {
   CampaignScene made = steady_scene(9, 6);
   shift_markers(made, test.markers, test.first, test.shift_mm);
   const CampaignResult result = extract_poses(made.campaign, made.observations);
-  std::string all;
-  for (const Finding& finding : result.findings) all += finding_text(finding) + "\n";
+  const std::string all = findings_text(result);
   EXPECT_THAT(all, HasSubstr(test.words));
   for (std::size_t e = 1; e < result.poses.size(); ++e) {
     const MeasuredPose& pose = result.poses[e];
@@ -142,8 +141,7 @@ TEST(WholeGripBumped, IsAStepAgainstTheTargets) {
       targets[result.poses[e].id] = target;
     }
     judge_against_targets(targets, result);
-    std::string all;
-    for (const Finding& finding : result.findings) all += finding_text(finding) + "\n";
+    const std::string all = findings_text(result);
     if (!bumped) {
       EXPECT_EQ(all, "");
       continue;

@@ -152,8 +152,7 @@ TEST_P(DatumSlips, AreNamedAndNoPoseThatIsOkIsWrong) {
         pose_error(*pose.pose, true_pose(made, e)).cwiseQuotient(pose.covariance.diagonal().cwiseSqrt());
     EXPECT_LT(z.cwiseAbs().maxCoeff(), 4);
   }
-  std::string all;
-  for (const Finding& finding : result.findings) all += finding_text(finding) + "\n";
+  const std::string all = findings_text(result);
   EXPECT_THAT(all, HasSubstr(test.words));
   if (*test.words != 0) {
     EXPECT_NE(overall_verdict(result), Severity::good);

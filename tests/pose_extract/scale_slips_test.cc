@@ -58,8 +58,7 @@ TEST_P(ScaleSlips, MakePosesSuspectAndAreNamed) {
   made.campaign.print_scale_sigma = kPaperScaleSigma;
   test.slip(made);
   const CampaignResult result = extract_poses(made.campaign, made.observations);
-  std::string all;
-  for (const Finding& finding : result.findings) all += finding_text(finding) + "\n";
+  const std::string all = findings_text(result);
   EXPECT_THAT(all, HasSubstr(test.words));
   for (std::size_t e = 1; e < result.poses.size(); ++e) {
     const MeasuredPose& pose = result.poses[e];

@@ -15,6 +15,13 @@ struct CampaignScene {
   CampaignObservations observations;
 };
 
+/// All findings, a line each.
+inline std::string findings_text(const CampaignResult& result) {
+  std::string text;
+  for (const Finding& finding : result.findings) text += finding_text(finding) + "\n";
+  return text;
+}
+
 /// An observation of a square as a detector gives it.
 inline MarkerObservation marker_of(const Observation& seen) {
   MarkerObservation marker;
